@@ -16,6 +16,7 @@ void add_explain(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_discover(CLI::App& app);
 void add_signals(CLI::App& app);
+void add_table(CLI::App& app);
 void add_export(CLI::App& app);
 
 }  // namespace llmt::apps

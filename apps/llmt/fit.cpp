@@ -4,6 +4,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "llmt/arrow.hpp"
+#include "llmt/arrow_fit.hpp"
 #include "llmt/boost_command.hpp"
 #include "llmt/commands.hpp"
 #include "llmt/fit.hpp"
@@ -31,6 +33,9 @@ struct FitArguments {
   bool no_intervals = false;
   bool stream = false;
   bool boost = false;
+  std::string memory;
+  std::string checkpoint;
+  bool resume = false;
   std::string readable;  ///< the loss in per cent; empty: none is asked for
   ReportFiles reports;
 };
@@ -169,7 +174,24 @@ void add_fit(CLI::App& app) {
   command->add_flag("--boost", arguments->boost,
                     "A sum of many small trees, each fitted to what those before it leave: more accurate than one tree "
                     "as a rule, and nobody reads it");
+  command
+      ->add_option("--memory", arguments->memory,
+                   "Of an Arrow file: memory that the fit may take, such as 4G [half of the machine's]")
+      ->type_name("BYTES");
+  add_output_file(*command, "--checkpoint", arguments->checkpoint,
+                  "Of an Arrow file: where the fit stands after every pass over the rows");
+  command->add_flag("--resume", arguments->resume, "Go on from the file of --checkpoint if there is one");
   command->callback([command, arguments] {
+    if (is_arrow_file(arguments->learning.data)) {
+      arrow_fit_command(*command, {arguments->learning, arguments->output, arguments->json, arguments->no_intervals,
+                                   arguments->memory, arguments->checkpoint, arguments->resume});
+      return;
+    }
+    for (const char* option : {"--memory", "--checkpoint", "--resume"}) {
+      if (command->count(option) > 0) {
+        throw std::invalid_argument(fmt::format("{} is for Arrow files; llmt table makes one", option));
+      }
+    }
     require_target(arguments->learning);
     if (arguments->stream) {
       stream_command(*command, {arguments->learning, arguments->output, arguments->json});

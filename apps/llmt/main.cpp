@@ -41,6 +41,7 @@ int main(int argc, char** argv) {
   llmt::apps::add_explain(app);
   llmt::apps::add_compare(app);
   llmt::apps::add_signals(app);
+  llmt::apps::add_table(app);
   llmt::apps::add_discover(app);
   llmt::apps::add_export(app);
   return llmt::apps::run(app, argc, argv, setting_names);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "llmt/arrow.hpp"
 #include "llmt/boosted_model.hpp"
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
@@ -151,6 +152,64 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
   sink(text);
 }
 
+// Predictions of an Arrow file, whose rows are read piece by piece; the table's own columns are not repeated.
+void predict_arrow(const PredictArguments& arguments) {
+  if (arguments.json || arguments.interval > 0.0) {
+    throw std::invalid_argument(fmt::format("{} is not for Arrow files", arguments.json ? "--json" : "--interval"));
+  }
+  const Model model = load_model(arguments.model, false).model;
+  const ArrowTable table = ArrowTable::open(arguments.data);
+  std::vector<std::string> names;
+  for (const InputColumn& input : model.inputs()) {
+    if (input.is_categorical()) {
+      throw std::runtime_error(fmt::format("{}: input \"{}\" is a category, and an Arrow file is read for numbers",
+                                           arguments.model, input.name));
+    }
+    names.push_back(input.name);
+  }
+  const bool has_target = std::ranges::find(table.columns(), model.outputs()[0].name) != table.columns().end();
+  double squares = 0.0;
+  const auto write = [&](const TextSink& sink) {
+    std::string text;
+    for (const OutputColumn& output : model.outputs()) text += csv_field(output.name + "_pred") + ",";
+    sink(text + "outside,outside_by,leverage\n");
+    constexpr Eigen::Index rows_at_once = 65536;
+    for (Eigen::Index first = 0; first < table.rows(); first += rows_at_once) {
+      const Eigen::Index count = std::min(rows_at_once, table.rows() - first);
+      const Eigen::MatrixXd inputs = table.read(first, count, names);
+      const Eigen::MatrixXd values = model.predict(inputs, arguments.threads);
+      const std::vector<Extrapolation> extrapolation = model.extrapolation(inputs, arguments.threads);
+      if (has_target) {
+        const Eigen::MatrixXd target = table.read(first, count, {&model.outputs()[0].name, 1});
+        squares += (values.col(0) - target).squaredNorm();
+      }
+      text.clear();
+      for (Eigen::Index row = 0; row < count; ++row) {
+        for (Eigen::Index o = 0; o < values.cols(); ++o) {
+          append_number(text, arguments.mark, values(row, o));
+          text += ',';
+        }
+        text += extrapolation[row].distance > 0.0 ? "1," : "0,";
+        append_number(text, arguments.mark, extrapolation[row].distance);
+        text += ',';
+        append_number(text, arguments.mark, extrapolation[row].leverage);
+        text += '\n';
+      }
+      sink(text);
+    }
+  };
+  if (arguments.output.empty()) {
+    write(print_bytes);
+  } else {
+    write_file(arguments.output, write);
+  }
+  warn(fmt::format("llmt: {} rows of {}", table.rows(), table.path()));
+  if (has_target && std::isfinite(squares)) {
+    warn(fmt::format("llmt: RMSE of \"{}\": {:.6g}", model.outputs()[0].name,
+                     std::sqrt(squares / static_cast<double>(table.rows()))));
+  }
+}
+
 report::Prediction predict_file(const PredictArguments& arguments, std::optional<Csv>& csv) {
   const auto read = [&] {
     csv.emplace(read_table(arguments.data, arguments.mark, arguments.thousands));
@@ -173,6 +232,10 @@ report::Prediction predict_file(const PredictArguments& arguments, std::optional
 }
 
 void predict_command(const PredictArguments& arguments) {
+  if (is_arrow_file(arguments.data)) {
+    predict_arrow(arguments);
+    return;
+  }
   std::optional<Csv> csv;
   const report::Prediction predicted = predict_file(arguments, csv);
   if (const Eigen::Index count = report::count_not_finite(predicted); count > 0) {

@@ -5,11 +5,13 @@
 ///     for (const llmt::Leaf& leaf : learnt.leaves(0)) std::printf("%td rows\n", leaf.samples);
 #pragma once
 
+#include "llmt/arrow.hpp"
 #include "llmt/boosted.hpp"
 #include "llmt/boosted_model.hpp"
 #include "llmt/c_source.hpp"
 #include "llmt/compare.hpp"
 #include "llmt/csv.hpp"
+#include "llmt/distributed.hpp"
 #include "llmt/explain.hpp"
 #include "llmt/files.hpp"
 #include "llmt/fit.hpp"

@@ -1,0 +1,59 @@
+/// \file
+/// Tables of numbers in Arrow IPC files (Feather version 2, not compressed), which need not fit into memory.
+///
+///     const llmt::ArrowTable table = llmt::ArrowTable::open("rows.arrow");
+///     const Eigen::MatrixXd first = table.read(0, 1000, std::vector<std::string>{"x", "y"});
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "llmt/abi.hpp"
+
+namespace llmt {
+
+/// An Arrow IPC file of flat columns, opened for reading. What is read are integers of 8 to 64 bits and floating-point
+/// numbers of 32 and 64 bits, with or without missing values; columns of text, dates and other flat types may be there.
+/// Copies share the file. It may be used by several threads at a time.
+///
+/// Source: the Arrow columnar format, versions 1.0 and later (metadata version 5; 4 is read, too).
+class ArrowTable {
+ public:
+  /// Reads what describes the table. The file may be of any origin: throws std::runtime_error, starting with `path`, if
+  /// it cannot be read, is no Arrow file, is cut off, describes parts that lie outside of it or do not go together, is
+  /// compressed, big-endian, or has nested columns.
+  static ArrowTable open(const std::string& path);
+
+  const std::string& path() const;
+  const std::vector<std::string>& columns() const;
+  Eigen::Index rows() const;
+
+  /// Rows first ... first + count - 1 of these columns, rows x columns; NaN where a value is missing. Throws
+  /// std::runtime_error `path: ...` for a column that does not exist or holds no numbers, and if the file cannot be
+  /// read; std::invalid_argument for rows that do not exist.
+  Eigen::MatrixXd read(Eigen::Index first, Eigen::Index count, std::span<const std::string> columns) const;
+
+  struct Parts;
+
+ private:
+  std::shared_ptr<const Parts> parts_;
+};
+
+/// Whether a file begins as an Arrow file does. False for what is no regular file or cannot be read.
+bool is_arrow_file(const std::string& path);
+
+/// Gives the next rows, as many columns as names; nothing at the end.
+using NextRows = std::function<std::optional<Eigen::MatrixXd>()>;
+
+/// Writes a table of 64-bit floating-point numbers, NaN as missing, in batches of at most 65536 rows, through a
+/// temporary file as write_file(). Returns the number of rows. Throws std::invalid_argument if there is no name, a name
+/// is repeated, or rows have another number of columns; what `next` throws; and as write_file().
+Eigen::Index write_arrow(const std::string& path, const std::vector<std::string>& columns, const NextRows& next);
+
+}  // namespace llmt

@@ -1,0 +1,269 @@
+#include "distributed/block_sums.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+
+#include "base/parallel.hpp"
+#include "data/row_hash.hpp"
+#include "stream/sums.hpp"
+
+namespace llmt::distributed {
+namespace {
+
+// Blocks that are summed at a time.
+constexpr Eigen::Index blocks_at_once = 4;
+
+[[noreturn]] void refuse(const std::string& reason) {
+  throw std::invalid_argument("llmt::distributed::sums: " + reason);
+}
+
+void check_rows(const Rows& rows, const StateData& data) {
+  if (data.step == Step::finished) refuse("the fit is finished");
+  if (rows.first_block < 0) refuse(fmt::format("first_block is {}, it must be at least 0", rows.first_block));
+  if (rows.inputs.cols() != data.inputs()) {
+    refuse(fmt::format("the rows have {} inputs, the fit has {}", rows.inputs.cols(), data.inputs()));
+  }
+  if (rows.inputs.rows() != rows.output.size()) {
+    refuse(fmt::format("{} rows of inputs, {} of the output", rows.inputs.rows(), rows.output.size()));
+  }
+}
+
+void check_value(const StateData& data, double value, Eigen::Index row, Eigen::Index column) {
+  const bool is_output = column == data.inputs();
+  const bool may_be_missing = !is_output && (data.step == Step::describe || data.rows <= data.options.branch_rows);
+  if (std::abs(value) <= largest_magnitude || (may_be_missing && std::isnan(value))) return;
+  refuse(fmt::format("row {}, column \"{}\" is {}, it must be a number of at most {:g}", row,
+                     to_string(is_output ? data.output_name : data.input_names[column]), value, largest_magnitude));
+}
+
+// The rows of one block.
+struct Block {
+  const Rows& rows;
+  RowSpan span;
+  Eigen::Index number;  // of the block in the table
+
+  double at(Eigen::Index row, Eigen::Index column) const {
+    return column < rows.inputs.cols() ? rows.inputs(row, column) : rows.output(row);
+  }
+};
+
+Sample sample_of(const Block& block, Eigen::Index columns) {
+  std::vector<std::pair<std::uint64_t, Eigen::Index>> hashed;
+  const std::uint64_t of_block = row_hash(0, static_cast<double>(block.number));
+  for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
+    hashed.emplace_back(row_hash(of_block, static_cast<double>(row - block.span.begin)), row);
+  }
+  const std::size_t kept = std::min(Sample::most, hashed.size());
+  std::ranges::nth_element(hashed, hashed.begin() + static_cast<std::ptrdiff_t>(kept));
+  hashed.resize(kept);
+  std::ranges::sort(hashed);
+  Sample sample;
+  for (const auto& [hash, row] : hashed) {
+    sample.hashes.push_back(hash);
+    for (Eigen::Index column = 0; column < columns; ++column) sample.values.push_back(block.at(row, column));
+  }
+  return sample;
+}
+
+void describe(const StateData& data, const Block& block, Description& sum) {
+  const Eigen::Index columns = data.inputs() + 1;
+  sum.rows = block.span.count();
+  sum.range.resize(columns);
+  sum.total.assign(columns, 0.0);
+  sum.missing.assign(data.inputs(), 0);
+  for (Eigen::Index column = 0; column < columns; ++column) {
+    for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
+      const double value = block.at(row, column);
+      check_value(data, value, row, column);
+      if (std::isnan(value)) {
+        ++sum.missing[column];
+      } else {
+        sum.range[column].widen(value);
+        sum.total[column] += value;
+      }
+    }
+  }
+  sum.sample = sample_of(block, columns);
+}
+
+// Scales the rows of a pass and finds their nodes.
+class Placed {
+ public:
+  explicit Placed(const StateData& data) : data_(data), z_(data.inputs()) {
+    if (data.nodes.front().fate != Fate::inner) return;
+    int rank = 0;
+    root_ = model_of(data, data.nodes.front(), rank);
+  }
+
+  void set(const Block& block, Eigen::Index row) {
+    const Eigen::Index inputs = data_.inputs();
+    for (Eigen::Index j = 0; j <= inputs; ++j) check_value(data_, block.at(row, j), row, j);
+    for (Eigen::Index j = 0; j < inputs; ++j) z_(j) = (block.rows.inputs(row, j) - data_.mean(j)) / data_.scale(j);
+    y_ = (block.rows.output(row) - data_.mean(inputs)) / data_.scale(inputs);
+    node_ = 0;
+    while (data_.nodes[node_].fate == Fate::inner) {
+      const TopNode& node = data_.nodes[node_];
+      node_ = block.rows.inputs(row, node.input) <= node.threshold ? node.left : node.right;
+    }
+  }
+
+  const Eigen::VectorXd& z() const { return z_; }
+  double y() const { return y_; }
+  Eigen::Index node() const { return node_; }
+
+  void widen(Extent& root_residual) const {
+    if (root_.size() == 0) return;
+    root_residual.widen(data_.scale(data_.inputs()) * (y_ - root_(0) - root_.tail(z_.size()).dot(z_)));
+  }
+
+ private:
+  const StateData& data_;
+  Eigen::VectorXd root_;  // the root's model, once it is known
+  Eigen::VectorXd z_;
+  double y_ = 0.0;
+  Eigen::Index node_ = 0;
+};
+
+// Numbers of bins: the number of edges below a value, by bisection without branches.
+class BinFinder {
+ public:
+  explicit BinFinder(const std::vector<double>& edges) {
+    padded_.fill(std::numeric_limits<double>::infinity());
+    std::ranges::copy(edges, padded_.begin());
+  }
+
+  Eigen::Index operator()(double value) const {
+    std::size_t below = 0;
+    for (std::size_t step = padded_.size() / 2; step > 0; step /= 2) {
+      below += padded_[below + step - 1] < value ? step : 0;
+    }
+    return static_cast<Eigen::Index>(below);
+  }
+
+ private:
+  std::array<double, 256> padded_{};
+};
+
+void grow(const StateData& data, const Block& block, BlockSum& sum) {
+  const GramShape shape = data.shape();
+  const Eigen::Index inputs = data.inputs();
+  const std::vector<Eigen::Index> first = first_bins(data);
+  std::vector<BinFinder> finders;
+  for (const std::vector<double>& edges : data.edges) finders.emplace_back(edges);
+  std::vector<NodeSums*> sums(data.nodes.size(), nullptr);
+  std::vector<Basis> basis(data.nodes.size());
+  for (const Eigen::Index node : data.asked) basis[node] = {Eigen::VectorXd::Zero(inputs), data.nodes[node].base};
+  RowProducts products(shape);
+  Placed placed(data);
+  for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
+    placed.set(block, row);
+    placed.widen(sum.root_residual);
+    const Eigen::Index node = placed.node();
+    if (basis[node].base.size() == 0) continue;
+    NodeSums*& of_node = sums[node];
+    if (of_node == nullptr) {
+      of_node = &sum.nodes[node];
+      of_node->grams.assign(first.back() * shape.size(), 0.0);
+      of_node->counts.assign(first.back(), 0);
+      of_node->held_out.assign(shape.size(), 0.0);
+      of_node->range.resize(inputs);
+    }
+    products.set(basis[node], placed.z().data(), placed.y(), 1.0);
+    for (Eigen::Index j = 0; j < inputs; ++j) {
+      const Eigen::Index bin = first[j] + finders[j](block.rows.inputs(row, j));
+      products.add_to(of_node->grams.data() + bin * shape.size());
+      ++of_node->counts[bin];
+      of_node->range[j].widen(placed.z()(j));
+    }
+    if (is_held_out(block.number)) products.add_to(of_node->held_out.data());
+  }
+}
+
+void gather(const StateData& data, const Block& block, BlockSum& sum) {
+  const Eigen::Index inputs = data.inputs();
+  std::vector<std::vector<double>*> rows(data.nodes.size(), nullptr);
+  Placed placed(data);
+  for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
+    placed.set(block, row);
+    placed.widen(sum.root_residual);
+    const Eigen::Index node = placed.node();
+    if (!std::ranges::binary_search(data.asked, node)) continue;
+    if (rows[node] == nullptr) rows[node] = &sum.branches[node].pieces.emplace_back();
+    for (Eigen::Index column = 0; column <= inputs; ++column) rows[node]->push_back(block.at(row, column));
+  }
+}
+
+BlockSum sum_block(const StateData& data, const Block& block) {
+  BlockSum sum;
+  if (data.step == Step::describe) describe(data, block, sum.description);
+  if (data.step == Step::grow) grow(data, block, sum);
+  if (data.step == Step::gather) gather(data, block, sum);
+  return sum;
+}
+
+}  // namespace
+
+Sample& Sample::operator+=(const Sample& other) {
+  if (other.hashes.empty()) return *this;
+  if (hashes.empty()) return *this = other;
+  const std::size_t columns = values.size() / hashes.size();
+  Sample both;
+  std::size_t a = 0;
+  std::size_t b = 0;
+  while (both.hashes.size() < most && (a < hashes.size() || b < other.hashes.size())) {
+    const bool own = b == other.hashes.size() || (a < hashes.size() && hashes[a] <= other.hashes[b]);
+    const Sample& from = own ? *this : other;
+    std::size_t& at = own ? a : b;
+    both.hashes.push_back(from.hashes[at]);
+    const auto row = from.values.begin() + static_cast<std::ptrdiff_t>(at * columns);
+    both.values.insert(both.values.end(), row, row + static_cast<std::ptrdiff_t>(columns));
+    ++at;
+  }
+  return *this = std::move(both);
+}
+
+BranchRows& BranchRows::operator+=(BranchRows&& next) {
+  std::ranges::move(next.pieces, std::back_inserter(pieces));
+  return *this;
+}
+
+std::vector<Eigen::Index> first_bins(const StateData& data) {
+  std::vector<Eigen::Index> first = {0};
+  for (Eigen::Index j = 0; j < data.inputs(); ++j) first.push_back(first.back() + bins_of(data, j));
+  return first;
+}
+
+Eigen::VectorXd model_of(const StateData& data, const TopNode& node, int& rank) {
+  return node.base + solve(data.shape(), node.gram.data(), 0.0, rank);
+}
+
+Sums sums(const Rows& rows, const State& state, int max_threads) {
+  const StateData& data = state.data();
+  check_rows(rows, data);
+  auto result = std::make_unique<SumsData>();
+  result->mark = data.mark;
+  result->step = data.step;
+  result->inputs = data.inputs();
+  result->bins = data.step == Step::describe ? 0 : first_bins(data).back();
+  const RowBlocks blocks{rows.output.size(), data.options.block_rows};
+  if (blocks.count() == 0) return Sums(std::move(result));
+  Run run{rows.first_block, rows.first_block + blocks.count(), {}};
+  for (Eigen::Index first = 0; first < blocks.count(); first += blocks_at_once) {
+    std::vector<BlockSum> made(std::min(blocks_at_once, blocks.count() - first));
+    parallel_for(std::ssize(made), max_threads, [&](Eigen::Index k) {
+      made[k] = sum_block(data, {rows, blocks[first + k], rows.first_block + first + k});
+    });
+    for (Eigen::Index k = 0; k < std::ssize(made); ++k) run.sums.push(rows.first_block + first + k, std::move(made[k]));
+  }
+  result->runs.push_back(std::move(run));
+  return Sums(std::move(result));
+}
+
+}  // namespace llmt::distributed

@@ -1,0 +1,102 @@
+/// \file
+/// What is summed over the rows of a block.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <tuple>
+#include <vector>
+
+#include "base/sum_over.hpp"
+#include "distributed/state.hpp"
+#include "llmt/distributed.hpp"
+
+namespace llmt::distributed {
+
+/// The rows with the smallest hashes of their block and place in it: a sample that is the same however sums are merged.
+struct Sample {
+  static constexpr std::size_t most = 16384;
+
+  std::vector<std::uint64_t> hashes;  ///< ascending
+  std::vector<double> values;         ///< one row after the other: inputs, output
+
+  Sample& operator+=(const Sample& other);
+  static auto fields(auto& self) { return std::tie(self.hashes, self.values); }
+};
+
+/// What describes the columns.
+struct Description {
+  Eigen::Index rows = 0;
+  std::vector<Extent> range;          ///< inputs, output
+  std::vector<double> total;          ///< of the values that are not missing
+  std::vector<Eigen::Index> missing;  ///< of every input
+  Sample sample;
+
+  static auto fields(auto& self) { return std::tie(self.rows, self.range, self.total, self.missing, self.sample); }
+};
+
+/// Sums over the rows of a node that is to be split, in the layout of GramShape.
+struct NodeSums {
+  std::vector<double> grams;         ///< inputs x bins, one input after the other
+  std::vector<Eigen::Index> counts;  ///< rows of every bin
+  std::vector<double> held_out;      ///< Gram matrix of the rows in held-out blocks
+  std::vector<Extent> range;         ///< of every scaled input
+
+  static auto fields(auto& self) { return std::tie(self.grams, self.counts, self.held_out, self.range); }
+};
+
+/// Rows of a branch: inputs, output, one row after the other; in pieces, so that sums are merged without copies.
+struct BranchRows {
+  std::vector<std::vector<double>> pieces;
+
+  BranchRows& operator+=(BranchRows&& next);
+  static auto fields(auto& self) { return std::tie(self.pieces); }
+};
+
+/// All sums of a block, of which a step of the fit fills a part.
+struct BlockSum {
+  Description description;
+  Extent root_residual;
+  std::map<Eigen::Index, NodeSums> nodes;
+  std::map<Eigen::Index, BranchRows> branches;
+
+  static auto fields(auto& self) { return std::tie(self.description, self.root_residual, self.nodes, self.branches); }
+};
+
+/// Sums over blocks that follow each other.
+struct Run {
+  Eigen::Index first = 0;
+  Eigen::Index last = 0;  ///< behind the last block
+  BlockSums<BlockSum> sums;
+
+  static auto fields(auto& self) { return std::tie(self.first, self.last, self.sums); }
+};
+
+struct SumsData {
+  std::uint64_t mark = 0;  ///< of the state that asked
+  Step step = Step::describe;
+  Eigen::Index inputs = 0;
+  Eigen::Index bins = 0;  ///< of all inputs together
+  std::vector<Run> runs;  ///< ascending, with gaps between them
+
+  static auto fields(auto& self) { return std::tie(self.mark, self.step, self.inputs, self.bins, self.runs); }
+};
+
+/// Throws std::runtime_error if sizes or numbers of blocks do not go together.
+void check_sums(const SumsData& data);
+
+/// Bins of an input: one more than edges.
+inline Eigen::Index bins_of(const StateData& data, Eigen::Index input) { return std::ssize(data.edges[input]) + 1; }
+
+/// Where an input's bins begin among those of a node; of the number of inputs: the number of bins.
+std::vector<Eigen::Index> first_bins(const StateData& data);
+
+/// Whether the rows of a block are held out: every eighth block.
+inline bool is_held_out(Eigen::Index block) { return block % 8 == 7; }
+
+/// Constant and slopes of a node's local model, in scaled columns. `rank`: of [1, z] over its rows.
+Eigen::VectorXd model_of(const StateData& data, const TopNode& node, int& rank);
+
+}  // namespace llmt::distributed
