@@ -180,14 +180,15 @@ Missing plain_for_searched(const Simulation& simulation, const Inputs& inputs, c
 // search, which sets other rows aside. In time, what follows noise that is alike in neighbours lives on few rows: a
 // term must shrink the gap on the rows set aside, of one search or the next.
 Missing find_at(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                const std::vector<ModelTerm>& terms, const SearchedRows& rows, MissingOptions options) {
+                const std::vector<ModelTerm>& terms, const SearchedRows& rows, MissingOptions options,
+                Missing missing) {
   const bool in_time = inputs.instants.size() > 0;
   const int most = in_time ? 4 : 3;
   std::set<std::size_t> refuted;
   std::set<std::size_t> unproven;
   std::vector<std::string> notes;
   for (int trial = 1;; ++trial) {
-    Missing missing = search_once(simulation, inputs, measured, terms, rows, options, refuted);
+    if (trial > 1) missing = search_once(simulation, inputs, measured, terms, rows, options, refuted);
     const auto is_unproven = [&](const FoundTerm& found) { return in_time && !found.shrinks_gap; };
     const bool holds =
         missing.answer != Answer::failed_held_out && std::ranges::none_of(missing.found, [&](const FoundTerm& found) {
@@ -234,22 +235,23 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   const Inputs inputs = with_zero_bands(there, smooth.inputs, measured);
   SearchedRows rows{rows_at_rest(inputs)};
   for (std::size_t i = 0; i < rows.apart.size(); ++i) rows.apart[i] = rows.apart[i] || smooth.unknown_sign[i];
-  Missing missing = find_at(there, inputs, measured, terms, rows, options);
+  Missing missing = search_once(there, inputs, measured, terms, rows, options, {});
   // What is left is alike in neighbours: single rows say little more than their means, which hold less noise.
   constexpr double alike = 0.5;  // independent share
   constexpr Eigen::Index fewest_of_alike = 80;
   if (missing.time.in_time && missing.time.independent_share < alike) {
     rows.fewest_samples = fewest_of_alike;
-    missing = find_at(there, inputs, measured, terms, rows, options);
+    missing = search_once(there, inputs, measured, terms, rows, options, {});
   }
   std::vector<std::string> at_reversals;
   constexpr int most = 3;
   for (int k = 0; k < most && inputs.instants.size() > 0; ++k) {
     const std::vector<Reversals> reversals = left_at_reversals(inputs, measured, missing, rows.apart);
     if (reversals.empty()) break;
-    missing = find_at(there, inputs, measured, terms, rows, options);
+    missing = search_once(there, inputs, measured, terms, rows, options, {});
     at_reversals = notes_on_reversals(reversals);
   }
+  missing = find_at(there, inputs, measured, terms, rows, options, std::move(missing));
   missing.zero_bands = inputs.zero_bands;
   if (is_smoothed) {
     missing.before -= smooth.change;
