@@ -149,17 +149,17 @@ std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const 
 // Inputs that look as if nobody meant them: (kind, position, unit).
 std::vector<std::tuple<std::string, int, std::string>> accidental(const Array& inputs,
                                                                   std::vector<std::vector<std::string>> levels) {
-  using Kind = report::AccidentalInput::Kind;
+  using Why = report::AccidentalInput::Kind;
   report::InputColumns columns{.values = rows_of(inputs), .levels = std::move(levels), .categorical = {}};
   for (int j = 0; j < static_cast<int>(columns.levels.size()); ++j) {
     if (!columns.levels[j].empty()) columns.categorical.push_back(j);
   }
   std::vector<std::tuple<std::string, int, std::string>> found;
   for (const report::AccidentalInput& input : report::accidental_inputs(columns)) {
-    const char* kind = input.kind == Kind::words   ? "words"
-                       : input.kind == Kind::dates ? "dates"
-                       : input.kind == Kind::unit  ? "unit"
-                                                   : "row_numbers";
+    const char* kind = input.kind == Why::words   ? "words"
+                       : input.kind == Why::dates ? "dates"
+                       : input.kind == Why::unit  ? "unit"
+                                                  : "row_numbers";
     found.emplace_back(kind, input.input, input.unit);
   }
   return found;

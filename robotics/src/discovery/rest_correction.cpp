@@ -9,10 +9,10 @@ namespace llmt::robotics {
 
 void add_correction(const Measurements& searched, std::uint64_t seed, Work& work, CorrectedRobot& improved,
                     std::vector<std::string>& notes) {
-  constexpr Eigen::Index fewest = 100;
+  constexpr Eigen::Index fewest_measured = 100;
   constexpr int folds = 5;
   constexpr double share_of_fits = 0.9;
-  if (searched.count() < fewest) return;
+  if (searched.count() < fewest_measured) return;
   FitOptions fitting;
   fitting.validity = ValidityChoice::crisp;
   fitting.intervals = false;
