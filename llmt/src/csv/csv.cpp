@@ -50,6 +50,10 @@ void Csv::read_header() {
   }
   const std::string_view header = header_text();
   const char* const end = header.data() + header.size();
+  if (header.starts_with("ARROW1")) {
+    throw std::runtime_error(fmt::format(
+        "{}: this is an Arrow file, a table of text is needed; llmt fit and llmt predict read both", name_));
+  }
   if (header.starts_with("\xFF\xFE") || header.starts_with("\xFE\xFF") || header.find('\0') != std::string_view::npos) {
     throw std::runtime_error(fmt::format("{}: this is UTF-16 or no text at all, UTF-8 is needed", name_));
   }

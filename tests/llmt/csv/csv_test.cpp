@@ -167,6 +167,8 @@ TEST(Csv, TextThatIsNotUtf8IsNamed) {
                                10)),
             utf_16);
   EXPECT_EQ(header(std::string("a\0,\0b\0\n\0", 8)), utf_16);
+  EXPECT_EQ(header(std::string("ARROW1\0\0\xFF\xFF\xFF\xFF", 12)),
+            "t.csv: this is an Arrow file, a table of text is needed; llmt fit and llmt predict read both");
   // Cut off, longer than needed, half of a pair of UTF-16, beyond U+10FFFF, a byte that begins nothing.
   const std::map<std::string, std::string> first_bytes = {
       {"b\xC3", "c3"},        {"b\xE2\x82", "e2"},        {"\xC0\xAF", "c0"}, {"\xE0\x80\xAF", "e0"},
