@@ -166,7 +166,7 @@ TEST(Reversals, FrictionRoundedByAFilterIsNoMissingTerm) {
     const Missing missing = find_missing(tabulated(simulated, {"u"}), inputs, measured, standard_terms(inputs));
     EXPECT_EQ(missing.answer, Answer::nothing_missing) << to_string(missing.answer);
     const auto speaks_of_reversals = [](const std::string& note) {
-      return note.find("near its reversals") != std::string::npos && note.find("|dq|") != std::string::npos;
+      return note.find("at reversals of dq") != std::string::npos && note.find("|dq|") != std::string::npos;
     };
     EXPECT_EQ(std::ranges::count_if(missing.notes, speaks_of_reversals), 1);
     // Drag beside it has its name.

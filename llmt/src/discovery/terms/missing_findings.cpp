@@ -68,9 +68,9 @@ bool has_rival_in_place(const FoundTerm& found) {
   });
 }
 
-// Terms that together may only approximate another function: three or more kinds of one input, two of which one has a
-// rival of that input, or two terms of the same two inputs.
-std::vector<bool> approximations(const std::vector<FoundTerm>& all) {
+// Terms that together may only approximate another function: three or more kinds of one input (in time, two of which
+// one has a rival of that input), or two terms of the same two inputs.
+std::vector<bool> approximations(const std::vector<FoundTerm>& all, bool in_time) {
   // Terms of one input are counted by kinds, as there may be several steps. A product and a square times the other
   // input are as much of a power series in two inputs as the terms have.
   constexpr std::array<std::size_t, 2> too_many = {3, 2};
@@ -83,7 +83,7 @@ std::vector<bool> approximations(const std::vector<FoundTerm>& all) {
   std::set<Place> uncertain;
   for (const FoundTerm& found : all) {
     if (!is_counted(found)) continue;
-    if (found.inputs.size() == 1 && has_rival_in_place(found)) uncertain.insert(place_of(found));
+    if (in_time && found.inputs.size() == 1 && has_rival_in_place(found)) uncertain.insert(place_of(found));
     kinds[place_of(found)].insert(found.inputs.size() == 1 ? kind_of(found) : found.family + " " + found.location);
   }
   std::vector<bool> approximate;
@@ -176,7 +176,7 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
   return all;
 }
 
-void decide(Missing& missing) {
+void decide(Missing& missing, bool in_time) {
   const bool is_nothing = missing.verdict.answer == Answer::nothing_missing;
   missing.answer = is_nothing && !missing.structure.empty() ? Answer::unknown : missing.verdict.answer;
   constexpr double certain = 2.0;  // standard errors
@@ -187,7 +187,7 @@ void decide(Missing& missing) {
   const bool has_inner_state = std::ranges::any_of(missing.found, is_state);
   if (has_inner_state) missing.answer = Answer::inner_state;
   if (!missing.failing_rows.empty()) missing.answer = Answer::failed_held_out;
-  const std::vector<bool> approximate = approximations(missing.found);
+  const std::vector<bool> approximate = approximations(missing.found, in_time);
   std::set<std::vector<std::string>> noted;
   for (std::size_t k = 0; k < missing.found.size(); ++k) {
     FoundTerm& found = missing.found[k];

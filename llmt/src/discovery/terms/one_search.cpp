@@ -117,7 +117,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   judge_held_out(model, kept, aside, baseline, settled, missing);
   if (in_time) judge_in_time(model, kept, inputs, measured, settled, missing);
   missing.notes.insert(missing.notes.end(), errors.notes.begin(), errors.notes.end());
-  decide(missing);
+  decide(missing, in_time);
   doubt_uncorrected(errors, missing);
   demand_certainty(missing);
   describe_parameters({model, kept, start, baseline, settled.fit}, sums, options.search.false_alarm_rate, missing);

@@ -11,7 +11,7 @@ namespace llmt::discovery {
 /// The rows of a search.
 struct SearchedRows {
   std::vector<bool> apart;             ///< not searched, not set aside either
-  Eigen::Index fewest_samples = 1000;  ///< as many are left, at least, where rows in time are averaged
+  Eigen::Index fewest_samples = 1000;  ///< that averaging rows in time may leave
 };
 
 /// Searches all terms but those refuted at all rows but those apart, and judges what it finds on the rows set aside.

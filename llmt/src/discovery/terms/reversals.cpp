@@ -23,7 +23,7 @@ Eigen::Index slow_and_large(const Eigen::VectorXd& squares, const Eigen::VectorX
   constexpr Eigen::Index fewest_of_a_bin = 10;
   constexpr double larger = 2.0;
   constexpr double clearly_larger = 3.0;
-  const double widest = 0.3;
+  constexpr double widest = 0.3;
   constexpr double unexplained = 0.15;  // of the gap
   constexpr double far = 4.0;           // the square of two standard deviations
   constexpr double share_of_far = 0.15;

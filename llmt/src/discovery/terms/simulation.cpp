@@ -115,9 +115,10 @@ std::vector<std::string> notes_on_reversals(const std::vector<Reversals>& revers
   std::vector<std::string> notes;
   for (const Reversals& own : reversals) {
     notes.push_back(fmt::format(
-        "near its reversals, with |{0}| < {1:.3g}, deviations are {2:.2g} times as large as elsewhere, and no term "
-        "explains that: friction that a filter has rounded, or a machine that sticks. These {3} rows were set apart; "
-        "the answer is of the others",
+        "at reversals of {0}, where |{0}| < {1:.3g}, the root mean square of the deviations is {2:.2g} times that at "
+        "the "
+        "faster half of the rows, and no term explains this: a filter has rounded dry friction, or the machine sticks. "
+        "These {3} rows were set apart. The answer is about the other rows",
         own.speed, own.limit, own.ratio, own.rows));
   }
   return notes;
