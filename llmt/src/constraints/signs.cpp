@@ -9,7 +9,7 @@ namespace {
 
 // Added to the diagonal of a node's Gram matrix, in rows and relative to them. It keeps the matrix positive definite,
 // and the model as it is in directions that the rows do not determine.
-constexpr double least_diagonal = 1e-9;
+constexpr double added_diagonal = 1e-9;
 
 }  // namespace
 
@@ -35,7 +35,7 @@ bool has_signs(const std::vector<int>& signs, const Node& node) {
 void keep_signs_by_gram(const std::vector<int>& signs, const Eigen::MatrixXd& gram, const Eigen::VectorXd& scale,
                         Node& node) {
   Eigen::MatrixXd matrix = gram;
-  matrix.diagonal().array() += least_diagonal * (1.0 + gram(0, 0));
+  matrix.diagonal().array() += added_diagonal * (1.0 + gram(0, 0));
   const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
   const Eigen::Index regressors = scale.size();
   for (Eigen::Index o = 0; o < node.value.size(); ++o) {

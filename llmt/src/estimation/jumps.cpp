@@ -36,10 +36,10 @@ constexpr Eigen::Index densest = 4;
 constexpr double significance = 0.05;
 
 // Scatter below this part of the outputs' range is rounding.
-constexpr double rounding = 1e-10;
+constexpr double rounding_of_range = 1e-10;
 
 // Columns of the gap below this part of the largest, after those of the continuous model are taken off, count as zero.
-constexpr double least_independence = 1e-6;
+constexpr double least_part_of_gap = 1e-6;
 
 // Rows of a node with a value of the split input, by their distance from the threshold.
 struct Sides {
@@ -145,7 +145,7 @@ double root_mean_square_gap(BandRegression band, const std::vector<double>& leas
     columns->topRows(first.rank()).setZero();
   }
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> second(band.jump);
-  second.setThreshold(least_independence);
+  second.setThreshold(least_part_of_gap);
   const Eigen::Index rank = second.rank();
   const Eigen::Index count = band.residuals.rows();
   const Eigen::Index freedom = count - first.rank() - rank;
@@ -179,7 +179,7 @@ double jump_size(const TrainingRows& training, const Partition& grown, const Nod
   std::vector<double> least_scatter;
   for (const int output : grown.outputs) {
     const OutputColumn& column = training.output_columns[output];
-    least_scatter.push_back(rounding * (column.high - column.low));
+    least_scatter.push_back(rounding_of_range * (column.high - column.low));
   }
   const double candidates = static_cast<double>(node.samples * std::ssize(training.table->split_inputs));
   return root_mean_square_gap(regression(training, grown, node, rows, along), least_scatter, candidates);

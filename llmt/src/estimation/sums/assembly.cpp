@@ -30,7 +30,7 @@ constexpr Eigen::Index rows_of_lot = 128;
 // Most numbers that their outer products take: 2 MiB.
 constexpr Eigen::Index outer_products = Eigen::Index{1} << 18;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double unbounded = std::numeric_limits<double>::infinity();
 
 // Sums that are formed at once.
 constexpr Eigen::Index tile = 4;
@@ -203,7 +203,7 @@ SumsOfLeaf Assembly::nothing() const {
   return {std::vector<double>(padded_to_lanes(packed_), 0.0),
           Eigen::MatrixXd::Zero(size_, root_.cols()),
           Eigen::VectorXd::Zero(root_.cols()),
-          {Eigen::VectorXd::Constant(size_ - 1, infinity), Eigen::VectorXd::Constant(size_ - 1, -infinity)},
+          {Eigen::VectorXd::Constant(size_ - 1, unbounded), Eigen::VectorXd::Constant(size_ - 1, -unbounded)},
           {}};
 }
 
