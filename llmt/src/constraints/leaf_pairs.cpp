@@ -15,7 +15,7 @@ using Coefficient = LeafPairs::Coefficient;
 
 // A transition is cut into four parts, each with Bernstein coefficients of its own. With more parts the coefficients
 // are closer to the values of the polynomial, and there are more inequalities.
-constexpr int parts = 4;
+constexpr int parts_of_transition = 4;
 
 // Pieces bent less than this, relative to their values, are straight.
 constexpr double straight = 1e-12;
@@ -70,9 +70,9 @@ std::vector<Coefficient> transition_coefficients(const Transition& transition, d
   const double first = 0.5 * ((transition.from - transition.threshold) / h + 1.0);
   const double last = 0.5 * ((transition.to - transition.threshold) / h + 1.0);
   std::vector<Coefficient> result;
-  for (int part = 0; part < parts; ++part) {
-    const double begin = std::clamp(first + (last - first) * part / parts, 0.0, 1.0);
-    const double end = std::clamp(first + (last - first) * (part + 1) / parts, 0.0, 1.0);
+  for (int part = 0; part < parts_of_transition; ++part) {
+    const double begin = std::clamp(first + (last - first) * part / parts_of_transition, 0.0, 1.0);
+    const double end = std::clamp(first + (last - first) * (part + 1) / parts_of_transition, 0.0, 1.0);
     const Bernstein a = on_part(of_left, begin, end);
     const Bernstein b = on_part(of_right, begin, end);
     const Bernstein c = on_part(slope, begin, end);

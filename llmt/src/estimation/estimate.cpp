@@ -15,7 +15,7 @@ constexpr Eigen::Index leaves_that_agree = 32;
 
 // Rows for each unknown of the sample from which a joint estimate on many rows starts. It is used where there are more
 // than twice as many rows.
-constexpr Eigen::Index rows_per_unknown = 50;
+constexpr Eigen::Index first_sample_rows_per_unknown = 50;
 
 }  // namespace
 
@@ -56,7 +56,7 @@ Partition estimate(const TrainingRows& training, const GrownTree& grown, const C
   if (candidate.leaves == 1) {
     partition.outer_slope.resize(0, 0);  // one linear model goes on with its own slopes
   }
-  const Eigen::Index enough = rows_per_unknown * candidate.leaves * (std::ssize(training.regressors) + 1);
+  const Eigen::Index enough = first_sample_rows_per_unknown * candidate.leaves * (std::ssize(training.regressors) + 1);
   const bool is_crisp = candidate.validity.kind == ValidityKind::crisp;
   if (!is_crisp && candidate.estimation == Estimation::joint) {
     const Regularisation regularisation{candidate.ridge, candidate.shrinkage, candidate.sparse};

@@ -15,7 +15,7 @@ namespace llmt {
 namespace {
 
 // Of data with more rows than this a sample is used.
-constexpr Eigen::Index enough_rows = 200000;
+constexpr Eigen::Index most_rows_measured = 200000;
 
 // A band holds 20 % of the rows on the smaller side, at least 5 and at most 100 rows per coefficient of a local model.
 // For the lower bound it takes at most half of that side: a wide band would measure curvature. With fewer than 10 rows
@@ -221,7 +221,7 @@ TrainingRows rows_to_measure_on(const TrainingRows& all) {
 }  // namespace
 
 Eigen::VectorXd jump_sizes(const TrainingRows& all, const Partition& grown, int max_threads) {
-  const TrainingRows training = subsample(rows_to_measure_on(all), enough_rows, max_threads);
+  const TrainingRows training = subsample(rows_to_measure_on(all), most_rows_measured, max_threads);
   const Evaluator evaluator(grown, training.columns, std::ssize(training.regressors));
   std::vector<int> leaf_of_row(training.count(), 0);
   parallel_for(num_chunks(training), max_threads, [&](Eigen::Index index) {

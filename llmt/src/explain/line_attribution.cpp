@@ -20,7 +20,7 @@ constexpr double shortest_piece = 1e-9;
 // Bounds on the time of one line: on the values of local models that are computed for its integrals, and on the number
 // of pieces times that of leaves. Beyond them the line is not cut at kinks, pieces are not halved, and integrals are of
 // low order. Trees that are fitted stay far below; a file may hold a chain of a thousand leaves that all overlap.
-constexpr double most_values = 2e8;
+constexpr double most_values_of_line = 2e8;
 constexpr double most_coarse_values = 1e6;
 constexpr double most_pieces_and_leaves = 2e7;
 
@@ -61,7 +61,7 @@ class Line {
   bool is_polynomial() const {
     return partition_.validity.kind == ValidityKind::crisp || partition_.validity.kind == ValidityKind::blend;
   }
-  bool may_go_on() const { return values_ < (precision_.exact ? most_values : most_coarse_values); }
+  bool may_go_on() const { return values_ < (precision_.exact ? most_values_of_line : most_coarse_values); }
 
   // The integral of X.1 over a piece.
   int degree(const Eigen::VectorXd& row) const;

@@ -13,7 +13,7 @@ constexpr double added_to_diagonal = 1e-13;
 
 // An inequality counts as violated if more than this is missing, relative to its bound, plus this part of the largest
 // bound.
-constexpr double rounding = 1e-12;
+constexpr double rounding_of_bound = 1e-12;
 constexpr double rounding_of_largest = 1e-15;
 
 // Number of attempts to exchange all wrong inequalities at once, before they are exchanged one by one.
@@ -118,7 +118,7 @@ Eigen::VectorXd LeastDistance::solve() {
   const Eigen::Index count = bounds_.size();
   if (count == 0) return Eigen::VectorXd::Zero(normals_.rows());
   const Eigen::VectorXd tolerance =
-      rounding * bounds_.cwiseAbs().array() + rounding_of_largest * bounds_.cwiseAbs().maxCoeff();
+      rounding_of_bound * bounds_.cwiseAbs().array() + rounding_of_largest * bounds_.cwiseAbs().maxCoeff();
   if (exchange(tolerance)) return normals_ * multipliers_;
   for (Eigen::Index step = 0; step < most_steps(count); ++step) {
     Eigen::VectorXd missing = bounds_;

@@ -11,7 +11,7 @@ namespace {
 
 // Sizes of the blocks of a product: rows of a tile, rows of C, and the depth.
 constexpr Eigen::Index tile_rows = 4;
-constexpr Eigen::Index block = 64;
+constexpr Eigen::Index rows_of_c = 64;
 constexpr Eigen::Index depth_block = 256;
 
 // Rows of the panels in which a matrix is factored, and of the narrow panels inside them.
@@ -84,8 +84,8 @@ void add_transposed_product(Eigen::Index rows, Eigen::Index columns, Eigen::Inde
   for (Eigen::Index k = 0; k < depth; k += depth_block) {
     const Eigen::Index deep = std::min(depth_block, depth - k);
     pack<lanes>(b + k * b_stride, b_stride, deep, columns, packed_b);
-    for (Eigen::Index i = 0; i < rows; i += block) {
-      const Eigen::Index high = std::min(block, rows - i);
+    for (Eigen::Index i = 0; i < rows; i += rows_of_c) {
+      const Eigen::Index high = std::min(rows_of_c, rows - i);
       pack<tile_rows>(a + k * a_stride + i, a_stride, deep, high, packed_a);
       multiply_strips(high, columns, deep, sign, packed_a.data(), packed_b.data(), c + i * c_stride, c_stride);
     }

@@ -26,7 +26,7 @@ constexpr Eigen::Index most_growth_inputs = 13;
 constexpr double share_of_tree = 0.15;
 
 // Rows in a leaf, where the caller says nothing.
-constexpr Eigen::Index fewest_rows = 5;
+constexpr Eigen::Index usual_leaf_rows = 5;
 
 // Leaves before pruning, where the caller says nothing.
 constexpr Eigen::Index most_leaves = 200;
@@ -50,7 +50,7 @@ std::vector<Node> grow(const Sample& sample, const TreePlan& plan, const WalkSte
   options.split_inputs = common(table.split_inputs, step.inputs);
   if (options.split_inputs.empty()) return std::vector<Node>(1);
   const Eigen::Index coefficients = std::ssize(rows.regressors) + 1;
-  if (options.min_leaf_samples == 0) options.min_leaf_samples = std::max(fewest_rows, coefficients);
+  if (options.min_leaf_samples == 0) options.min_leaf_samples = std::max(usual_leaf_rows, coefficients);
   if (options.max_leaves == 0) options.max_leaves = most_leaves;
   return rule_of(GrowthRule::rd).grow(problem).nodes;
 }

@@ -41,7 +41,7 @@ class ArrowTest : public testing::Test {
           .string();
 };
 
-bool same(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+bool same_cells(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   if (a.rows() != b.rows() || a.cols() != b.cols()) return false;
   for (Eigen::Index k = 0; k < a.size(); ++k) {
     const double x = a.data()[k];
@@ -61,7 +61,7 @@ TEST_F(ArrowTest, EveryRangeOfRowsIsReadAsItWasWritten) {
   const ArrowTable table = ArrowTable::open(path_);
   EXPECT_EQ(table.rows(), values.rows());
   EXPECT_EQ(table.columns(), (std::vector<std::string>{"x", "caf\xc3\xa9"}));
-  EXPECT_TRUE(same(table.read(0, values.rows(), table.columns()), values));
+  EXPECT_TRUE(same_cells(table.read(0, values.rows(), table.columns()), values));
   for (const auto& [first, count] : {std::pair<Eigen::Index, Eigen::Index>{0, 0},
                                      {5, 9},
                                      {65530, 12},
@@ -71,7 +71,7 @@ TEST_F(ArrowTest, EveryRangeOfRowsIsReadAsItWasWritten) {
                                      {140000, 0}}) {
     const std::vector<std::string> reversed = {"caf\xc3\xa9", "x"};
     const Eigen::MatrixXd expected = values.middleRows(first, count).rowwise().reverse();
-    EXPECT_TRUE(same(table.read(first, count, reversed), expected)) << first;
+    EXPECT_TRUE(same_cells(table.read(first, count, reversed), expected)) << first;
   }
   EXPECT_THROW(table.read(139999, 2, table.columns()), std::invalid_argument);
   EXPECT_THROW(table.read(0, 1, std::vector<std::string>{"y"}), std::runtime_error);
@@ -131,8 +131,8 @@ TEST_F(ArrowTest, AFileOfAnotherProgramIsRead) {
   const double none = std::numeric_limits<double>::quiet_NaN();
   Eigen::MatrixXd expected(3, 4);
   expected << -128.0, 1.0, 1.5, 1099511627776.0, 0.0, none, -2.25, -1.0, 127.0, 65535.0, none, none;
-  EXPECT_TRUE(same(table.read(0, 3, std::vector<std::string>{"a", "b", "c", "d"}), expected));
-  EXPECT_TRUE(same(table.read(1, 2, std::vector<std::string>{"d"}), expected.bottomRightCorner(2, 1)));
+  EXPECT_TRUE(same_cells(table.read(0, 3, std::vector<std::string>{"a", "b", "c", "d"}), expected));
+  EXPECT_TRUE(same_cells(table.read(1, 2, std::vector<std::string>{"d"}), expected.bottomRightCorner(2, 1)));
   EXPECT_THROW(table.read(0, 1, std::vector<std::string>{"s"}), std::runtime_error);
 }
 

@@ -107,23 +107,24 @@ TEST(StreamJson, NothingIsLostOfWhatAStreamSays) {
   EXPECT_EQ(loaded.predict(rows_that_change().inputs), saved.predict(rows_that_change().inputs));
 }
 
-std::string refusal_of(const std::string& text) {
+std::string refusal_of_state(const std::string& text) {
   return oracle::thrown<std::runtime_error>([&] { llmt::stream_from_json(text, "s.json"); });
 }
 
 TEST(StreamJson, ATextThatIsCutOffIsRefusedWithThePlace) {
   const std::string text = to_json(after(800));
   const std::size_t tree = text.find("\"nodes\"");
-  EXPECT_EQ(refusal_of(text.substr(0, tree)).find("s.json: not JSON, or cut off: "), 0U);
-  EXPECT_NE(refusal_of(text.substr(0, tree + 200)).find(", in /trees/0/nodes/0/"), std::string::npos);
-  EXPECT_NE(refusal_of(text.substr(0, text.find("\"reservoir\"") + 40)).find(", in /reservoir/0"), std::string::npos);
-  EXPECT_EQ(refusal_of("").find("s.json: not JSON, or cut off: "), 0U);
+  EXPECT_EQ(refusal_of_state(text.substr(0, tree)).find("s.json: not JSON, or cut off: "), 0U);
+  EXPECT_NE(refusal_of_state(text.substr(0, tree + 200)).find(", in /trees/0/nodes/0/"), std::string::npos);
+  EXPECT_NE(refusal_of_state(text.substr(0, text.find("\"reservoir\"") + 40)).find(", in /reservoir/0"),
+            std::string::npos);
+  EXPECT_EQ(refusal_of_state("").find("s.json: not JSON, or cut off: "), 0U);
 }
 
 std::string refusal_with(const std::string& text, const std::function<void(Json&)>& change) {
   Json json = Json::parse(text);
   change(json);
-  return refusal_of(json.dump());
+  return refusal_of_state(json.dump());
 }
 
 TEST(StreamJson, ATextThatContradictsItselfIsRefusedWithThePlace) {
@@ -153,7 +154,7 @@ TEST(StreamJson, ATextThatContradictsItselfIsRefusedWithThePlace) {
             "s.json: /options: llmt::Stream: StreamOptions::significance is -1, it must be positive");
   EXPECT_EQ(refusal_with(text, [&](Json& json) { json["rows"] = 7; }), "s.json: /first_rows: 7 rows are needed");
   EXPECT_EQ(refusal_with(text, [&](Json& json) { json["version"] = 2; }), "s.json: /version: 2 is not within 1 ... 1");
-  EXPECT_EQ(refusal_of(llmt::to_json(after(100).snapshot())),
+  EXPECT_EQ(refusal_of_state(llmt::to_json(after(100).snapshot())),
             "s.json: not a stream: \"format\" is not \"llmt-stream\"");
 }
 

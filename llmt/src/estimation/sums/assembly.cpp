@@ -33,8 +33,8 @@ constexpr Eigen::Index outer_products = Eigen::Index{1} << 18;
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 
 // Sums that are formed at once.
-constexpr Eigen::Index tile = 4;
-static_assert(tile <= ActiveRows::more_columns);
+constexpr Eigen::Index leaves_at_once = 4;
+static_assert(leaves_at_once <= ActiveRows::more_columns);
 
 // Rows of outer products times a factor for each use, laid out as in ActiveRows, one row for each use; and their sum.
 LLMT_FOR_EACH_INSTRUCTION_SET
@@ -55,24 +55,24 @@ void scale_rows(std::span<const ActiveRows::Use> uses, const std::vector<double>
   }
 }
 
-// Sums over the uses of a leaf of validity x row, for the validities of `tile` leaves from `column` on. `sums`: tile x
-// padded numbers.
+// Sums over the uses of a leaf of validity x row, for the validities of `leaves_at_once` leaves from `column` on.
+// `sums`: leaves_at_once x padded numbers.
 LLMT_FOR_EACH_INSTRUCTION_SET
 void sum_tile(std::span<const ActiveRows::Use> uses, const RowMajor& validities, Eigen::Index column,
               const std::vector<double>& scaled, double* sums) {
   const Eigen::Index numbers = std::ssize(scaled) / std::ssize(uses);
   const double* row = scaled.data();
   for (Eigen::Index begin = 0; begin < numbers; begin += lanes) {
-    Lanes sum[tile] = {};
+    Lanes sum[leaves_at_once] = {};
     for (const ActiveRows::Use& use : uses) {
       const double* validity = validities.data() + use.row * validities.cols() + column;
       const Lanes of_row = *reinterpret_cast<const Lanes*>(row);
-      for (Eigen::Index t = 0; t < tile; ++t) {
+      for (Eigen::Index t = 0; t < leaves_at_once; ++t) {
         sum[t] += validity[t] * of_row;
       }
       row += lanes;
     }
-    for (Eigen::Index t = 0; t < tile; ++t) {
+    for (Eigen::Index t = 0; t < leaves_at_once; ++t) {
       *reinterpret_cast<Lanes*>(sums + t * numbers + begin) = sum[t];
     }
   }
@@ -235,11 +235,11 @@ void Assembly::add(const ActiveRows& active, int leaf, SumsOfLeaf& sums) const {
   }
   scale_rows(uses, factors, active, scaled, sums.gram.data());
   const Eigen::Index numbers = padded_to_lanes(packed_);
-  of_lot.resize(tile * numbers);
+  of_lot.resize(leaves_at_once * numbers);
   auto next = sums.blocks.lower_bound(active.leaves[first]);
-  for (Eigen::Index column = first; column <= active.column[leaf]; column += tile) {
+  for (Eigen::Index column = first; column <= active.column[leaf]; column += leaves_at_once) {
     sum_tile(uses, active.validities, column, scaled, of_lot.data());
-    for (Eigen::Index k = column; k < std::min(column + tile, active.column[leaf] + 1); ++k) {
+    for (Eigen::Index k = column; k < std::min(column + leaves_at_once, active.column[leaf] + 1); ++k) {
       const double* sum = of_lot.data() + (k - column) * numbers;
       // The sum of the products of validities: 0 where the leaves share no row.
       if (!(sum[0] > 0.0)) continue;

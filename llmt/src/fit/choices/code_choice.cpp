@@ -21,7 +21,7 @@ constexpr double longest_range = 11.0;
 constexpr std::size_t fewest_codes = 3;
 
 // A code has at least this many rows.
-constexpr Eigen::Index fewest_rows = 10;
+constexpr Eigen::Index fewest_rows_of_code = 10;
 
 // An input is compared if straight lines in it lack fit at this level, divided by the number of inputs and outputs.
 constexpr double significance_of_codes = 0.01;
@@ -57,7 +57,8 @@ std::vector<double> codes_in(const Eigen::Ref<const Eigen::VectorXd>& column, co
     ++rows_of[value];
     if (rows_of.rbegin()->first - rows_of.begin()->first > longest_range) return {};
   }
-  const bool is_often = std::ranges::all_of(rows_of, [](const auto& entry) { return entry.second >= fewest_rows; });
+  const bool is_often =
+      std::ranges::all_of(rows_of, [](const auto& entry) { return entry.second >= fewest_rows_of_code; });
   if (rows_of.size() < fewest_codes || !is_often) return {};
   std::vector<double> codes;
   for (const auto& [code, times] : rows_of) codes.push_back(code + 0.0);  // -0 as 0

@@ -36,7 +36,7 @@ void consider_missing(const GrowthData& data, const ExactLeaf& leaf, const Searc
 }
 
 // Most doubles (256 MiB) that the sums of all inputs may take between the two steps of the search.
-constexpr Eigen::Index most_sums = Eigen::Index{1} << 25;
+constexpr Eigen::Index most_kept_sums = Eigen::Index{1} << 25;
 
 // The search along one numeric input, with the edges of its blocks searched.
 InputSearch search_blocks(const GrowthData& data, const ExactLeaf& leaf, const SearchNode& node,
@@ -55,7 +55,7 @@ SplitCandidate compare_all_thresholds(const GrowthData& data, const ExactLeaf& l
   std::vector<std::optional<InputSearch>> searches(inputs);
   std::vector<SplitCandidate> found(inputs);
   const GramShape shape(node.features);
-  const bool forget = InputSearch::size_of_sums(shape, leaf.inputs.rows()) > most_sums / inputs;
+  const bool forget = InputSearch::size_of_sums(shape, leaf.inputs.rows()) > most_kept_sums / inputs;
   parallel_for(inputs, threads, [&](Eigen::Index j) {
     data.problem.check(leaf.inputs.rows());
     if (data.num_levels[j] > 0) {

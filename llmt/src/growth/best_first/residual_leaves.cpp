@@ -8,7 +8,7 @@
 namespace llmt {
 namespace {
 
-constexpr Eigen::Index rows_at_once = 4096;
+constexpr Eigen::Index rows_of_task = 4096;
 
 // Rows are prefetched this many rows before they are needed, because the rows of a node are scattered over the
 // features.
@@ -33,8 +33,8 @@ Eigen::MatrixXd ResidualLeaves::residuals(const ResidualLeaf& leaf, const Node& 
   model.col(0) = node.value - leaf.value;
   model.rightCols(coefficients - 1) = (node.slope - leaf.slope) * data_.training.scale.asDiagonal() * rows_.colouring();
   Eigen::MatrixXd result(count, features.outputs());
-  parallel_for((count + rows_at_once - 1) / rows_at_once, threads, [&](Eigen::Index block) {
-    for (Eigen::Index k = block * rows_at_once; k < std::min(count, (block + 1) * rows_at_once); ++k) {
+  parallel_for((count + rows_of_task - 1) / rows_of_task, threads, [&](Eigen::Index block) {
+    for (Eigen::Index k = block * rows_of_task; k < std::min(count, (block + 1) * rows_of_task); ++k) {
       features.prefetch(leaf.rows[std::min(count - 1, k + ahead)]);
       const double* const row = features.row(leaf.rows[k]);
       for (Eigen::Index o = 0; o < features.outputs(); ++o) {

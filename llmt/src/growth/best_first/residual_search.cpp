@@ -21,7 +21,7 @@ constexpr double grid = 0x1p-32;
 // is tried.
 constexpr double usual_significance = 0.05;
 
-struct Cut {
+struct ResidualCut {
   Eigen::Index input;
   double threshold;
   double deviate;
@@ -36,12 +36,14 @@ double threshold_of(const ResidualStatistics& statistics) {
 }
 
 // Position of the candidate with the largest deviate; of equal ones the first.
-Eigen::Index next_candidate(const std::vector<Cut>& candidates) {
+Eigen::Index next_candidate(const std::vector<ResidualCut>& candidates) {
   double largest = 0.0;
-  for (const Cut& candidate : candidates) {
+  for (const ResidualCut& candidate : candidates) {
     largest = std::max(largest, candidate.deviate);
   }
-  const auto is_largest = [&](const Cut& candidate) { return candidate.deviate >= (1.0 - tie_of_deviates) * largest; };
+  const auto is_largest = [&](const ResidualCut& candidate) {
+    return candidate.deviate >= (1.0 - tie_of_deviates) * largest;
+  };
   return std::ranges::find_if(candidates, is_largest) - candidates.begin();
 }
 
@@ -84,7 +86,7 @@ std::span<const double> values_of(const ResidualNode& node, Eigen::Index split_i
 }
 
 // Where each numeric input would be split for each output, if the test of its classes says anything.
-std::vector<Cut> candidates_of(const GrowthData& data, const ResidualNode& node) {
+std::vector<ResidualCut> candidates_of(const GrowthData& data, const ResidualNode& node) {
   const Eigen::Index outputs = node.residuals.cols();
   std::vector<ResidualStatistics> statistics(data.split_inputs() * outputs);
   parallel_for(std::ssize(statistics), node.threads, [&](Eigen::Index k) {
@@ -94,7 +96,7 @@ std::vector<Cut> candidates_of(const GrowthData& data, const ResidualNode& node)
     statistics[k] =
         residual_statistics(values_of(node, k / outputs), residuals, std::span(node.weights.data(), node.rows.size()));
   });
-  std::vector<Cut> candidates;
+  std::vector<ResidualCut> candidates;
   for (Eigen::Index k = 0; k < std::ssize(statistics); ++k) {
     const double deviate = statistics[k].deviate();
     if (deviate > 0.0) candidates.push_back({k / outputs, threshold_of(statistics[k]), deviate});
@@ -103,7 +105,7 @@ std::vector<Cut> candidates_of(const GrowthData& data, const ResidualNode& node)
 }
 
 // The split at a candidate's threshold, without the models of its sides.
-ResidualSplit divide(const ResidualNode& node, const Cut& candidate) {
+ResidualSplit divide(const ResidualNode& node, const ResidualCut& candidate) {
   ResidualSplit split;
   const std::span<const double> values = values_of(node, candidate.input);
   for (int i = 0; i < std::ssize(values); ++i) {
@@ -125,7 +127,7 @@ std::vector<double> sum_gram(const Features& features, std::span<const int> rows
 }
 
 ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& node) {
-  std::vector<Cut> candidates = candidates_of(data, node);
+  std::vector<ResidualCut> candidates = candidates_of(data, node);
   const Eigen::Index tested = std::ssize(candidates);
   const Eigen::Index smallest_leaf = std::max<Eigen::Index>(data.problem.options.min_leaf_samples, 1);
   const double level = std::min(data.problem.options.significance, usual_significance);
