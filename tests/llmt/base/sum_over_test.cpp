@@ -55,10 +55,10 @@ auto adds(const Eigen::MatrixXd& values) {
   };
 }
 
-constexpr Eigen::Index sizes[] = {1, 2048, 2049, 3 * 2048, 11 * 2048, 20 * 2048 + 7, 64 * 2048};
+constexpr Eigen::Index counts_of_rows[] = {1, 2048, 2049, 3 * 2048, 11 * 2048, 20 * 2048 + 7, 64 * 2048};
 
 TEST(SumOver, IsTheSameOnAnyNumberOfThreads) {
-  for (const Eigen::Index rows : sizes) {
+  for (const Eigen::Index rows : counts_of_rows) {
     const Eigen::MatrixXd values = values_of(rows, 1);
     const std::string one = llmt::to_bytes(llmt::sum_over(RowBlocks{rows}, 1, zero(), adds(values)));
     for (const int threads : {2, 3, 8}) {
@@ -69,7 +69,7 @@ TEST(SumOver, IsTheSameOnAnyNumberOfThreads) {
 }
 
 TEST(SumOver, IsTheSameIfWorkersSumRangesOfBlocksAndSendThemAsBytes) {
-  for (const Eigen::Index rows : sizes) {
+  for (const Eigen::Index rows : counts_of_rows) {
     const Eigen::MatrixXd values = values_of(rows, 2);
     const RowBlocks blocks{rows};
     const Eigen::Index count = blocks.count();
@@ -96,7 +96,7 @@ Value tree_of(const std::vector<Value>& blocks, std::size_t first, std::size_t w
 }
 
 TEST(SumOver, AddsBlocksAsABinaryTree) {
-  for (const Eigen::Index rows : sizes) {
+  for (const Eigen::Index rows : counts_of_rows) {
     const Eigen::VectorXd values = values_of(rows, 3).col(0);
     std::vector<double> of_blocks;
     double in_order = 0.0;
