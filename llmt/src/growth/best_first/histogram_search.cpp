@@ -10,7 +10,7 @@
 namespace llmt {
 namespace {
 
-constexpr double none = std::numeric_limits<double>::infinity();
+constexpr double no_edge = std::numeric_limits<double>::infinity();
 
 // Searching a bin exactly costs several times per row what the histogram costs. So the bins that are searched exactly
 // may hold at most one row in this number of rows.
@@ -122,7 +122,7 @@ SplitCandidate BinnedRows::best_edge(const Edges& edges, std::span<const Eigen::
     best.rank_left = edges.rank_left[k];
     best.rank_right = edges.rank_right[k];
     best.bin = static_cast<int>(edges.bins[k]);
-    best.last_left = none;
+    best.last_left = no_edge;
   }
   best.evaluations = best.tested;
   return best;
@@ -135,7 +135,7 @@ void BinnedRows::bound_bins(Edges& edges, std::span<const Eigen::Index> rows, st
   const Eigen::Index smallest_leaf = data_.problem.options.min_leaf_samples;
   const std::size_t count = edges.bins.size();
   const Eigen::Index all = count == 0 ? 0 : edges.rows_before.back() + rows[edges.bins.back()];
-  edges.bounds.assign(count, none);
+  edges.bounds.assign(count, no_edge);
   edges.ranks.assign(count, 0);
   for (std::size_t k = 0; k < count; ++k) {
     const Eigen::Index before = edges.rows_before[k];
@@ -225,7 +225,7 @@ std::vector<BinnedRows::PromisingBin> BinnedRows::promising_bins(const std::vect
 // The first promising bins, as many as hold at most half of the rows, but two at least.
 BinnedRows::ChosenBins BinnedRows::choose_bins(const std::vector<PromisingBin>& promising,
                                                const std::vector<Edges>& edges, Eigen::Index rows) {
-  ChosenBins chosen{std::vector<std::vector<std::size_t>>(edges.size()), 0, none};
+  ChosenBins chosen{std::vector<std::vector<std::size_t>>(edges.size()), 0, no_edge};
   for (std::size_t next = 0; next < promising.size(); ++next) {
     const auto& [bound, input, position] = promising[next];
     const std::vector<Eigen::Index>& rows_before = edges[input].rows_before;
@@ -273,7 +273,7 @@ SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<
   std::vector<Edges> edges(inputs_.bins.size());
   parallel_for(std::ssize(edges), data_.threads_for(size_of_histogram() / 4),
                [&](Eigen::Index j) { edges[j] = search_edges(histogram, rows, j, scale); });
-  double smallest = none;
+  double smallest = no_edge;
   Eigen::Index compared = 0;
   for (const Edges& input : edges) {
     if (input.best.input >= 0 || !input.best.level_side.empty()) smallest = std::min(smallest, input.best.adjusted);
