@@ -107,7 +107,8 @@ std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_p
   double smallest = aicc(remaining.rss, rows, 1.0);
   // The next model has the constant, the chosen regressors and one more.
   const auto enough_rows = [&] { return rows - static_cast<double>(order.size()) > 2.0 + least_spare_rows; };
-  while (order.size() < best + regressors_without_gain && enough_rows() && remaining.rss.maxCoeff() > rounding_of_squares) {
+  while (order.size() < best + regressors_without_gain && enough_rows() &&
+         remaining.rss.maxCoeff() > rounding_of_squares) {
     const Eigen::Index next = best_of(remaining);
     if (next < 0) break;
     take(next, correlation, std::ssize(order), remaining);
