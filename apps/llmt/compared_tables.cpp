@@ -30,12 +30,12 @@ Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, cons
                                  bool every_column) {
   const Eigen::MatrixXd one = read_named_inputs(simulated, names, every_column);
   Eigen::MatrixXd other = read_named_inputs(measured, names, every_column);
+  // Files are written with a limited number of digits.
+  constexpr double rounding = 1e-6;
+  const Eigen::RowVectorXd ranges = one.colwise().maxCoeff() - one.colwise().minCoeff();
   for (Eigen::Index i = 0; i < one.rows(); ++i) {
     for (Eigen::Index j = 0; j < one.cols(); ++j) {
-      // Files are written with a limited number of digits.
-      constexpr double rounding = 1e-6;
-      const double range = one.col(j).maxCoeff() - one.col(j).minCoeff();
-      if (std::abs(one(i, j) - other(i, j)) <= rounding * std::max(range, 1e-3 * std::abs(one(i, j)))) continue;
+      if (std::abs(one(i, j) - other(i, j)) <= rounding * std::max(ranges(j), 1e-3 * std::abs(one(i, j)))) continue;
       throw std::runtime_error(
           fmt::format("{}:{}: column \"{}\" is {}, but {} at {}:{}; rows must stand in the same order in both files",
                       measured.name(), measured.line_of(i), names[j], other(i, j), one(i, j), simulated.name(),

@@ -13,6 +13,7 @@ pytest.importorskip("scipy")
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "bench/logs"))
 
+import fit_by_sysid  # noqa: E402
 import logs  # noqa: E402
 import machines  # noqa: E402
 import motion  # noqa: E402
@@ -185,3 +186,14 @@ def test_parameters_alone_are_those_of_the_machine():
     assert dict(repair.fitted_parameters(case, logs.log_of(case, 1)).changes) == pytest.approx(
         {"m": 3.5, "b": 1.4, "f": 0.5}, rel=0.02
     )
+
+
+def test_sysid_gets_the_machine_with_motors_and_sensors():
+    mujoco = pytest.importorskip("mujoco")
+    for machine in ("arm", "cart", "elastic"):
+        given = mujoco.MjModel.from_xml_string(fit_by_sysid.text_of(machine, {}))
+        nominal = machines.model(machine, machines.as_key(machine, ()))
+        assert given.nu == given.nv == nominal.nv and given.nsensordata == 2 * nominal.nv
+        assert np.array_equal(given.dof_damping, nominal.dof_damping)
+        assert np.array_equal(given.body_mass, nominal.body_mass)
+    assert mujoco.MjModel.from_xml_string(fit_by_sysid.text_of("arm", {"m1": 2.5})).body_mass[1] == 2.5

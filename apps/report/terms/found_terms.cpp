@@ -93,6 +93,10 @@ void check_words(const FoundTerms& found) {
 // Values of a term of the past at all rows. `outputs`: without terms.
 Eigen::VectorXd inner_state(const FoundTerms& found, const FoundTerms::Term& term, const discovery::Inputs& inputs,
                             const Eigen::MatrixXd& outputs) {
+  if (inputs.instants.size() == 0 && !found.time.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: the term {} depends on when the rows were taken, which is not given", found.file, term.title));
+  }
   const std::vector<std::string> names = found.output_names();
   for (const discovery::ModelTerm& known : discovery::inner_state_terms(inputs, outputs, names)) {
     const bool is_this = known.family == term.family && known.location == term.location &&
