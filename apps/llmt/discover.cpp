@@ -85,7 +85,7 @@ std::vector<std::string> notes_on_constants(const Comparison& comparison) {
     if ((measured != measured(0)).any() ||
         (comparison.simulated.col(static_cast<Eigen::Index>(o)).array() == measured(0)).all())
       continue;
-    notes.push_back(fmt::format("{} was measured as {} at every row, whatever was simulated: is it the right column?",
+    notes.push_back(fmt::format("{} was measured as {} at every row, whatever was simulated: check the column",
                                 comparison.measured.names[o], number(measured(0))));
   }
   return notes;

@@ -10,6 +10,7 @@
 #include "llmt/csv.hpp"
 #include "llmt/random.hpp"
 
+namespace discover_time_test {
 namespace {
 
 using nlohmann::json;
@@ -185,9 +186,10 @@ TEST(DiscoverInTime, AColumnThatWasNotMeasuredIsNoted) {
   write_log(folder, "log", 1, 200, 0.0, 0.0, 1);
   folder.run("awk -F, -v OFS=, 'NR > 1 { $6 = 0 } 1' log_m.csv > zero.csv");
   const Outcome outcome = folder.run(discover + "log_s.csv zero.csv" + in_time);
-  EXPECT_NE(outcome.out.find("u was measured as 0 at every row, whatever was simulated: is it the right column?"),
+  EXPECT_NE(outcome.out.find("u was measured as 0 at every row, whatever was simulated: check the column"),
             std::string::npos)
       << outcome.out;
 }
 
 }  // namespace
+}  // namespace discover_time_test
