@@ -80,8 +80,8 @@ TEST(DiscoverInTime, CorrectedTablesKeepTimesAndRuns) {
 
 TEST(DiscoverInTime, ApplyPrintsTheGapOfEachRun) {
   const Folder folder;
-  write_log(folder, "log", 2, 300, 0.0, 1.5, 1);
-  write_log(folder, "other", 3, 200, 0.0, 1.5, 2);
+  write_log(folder, "log", 2, 300, 0.0, 15.0, 1);
+  write_log(folder, "other", 3, 200, 0.0, 15.0, 2);
   ASSERT_EQ(folder.run(discover + "log_s.csv log_m.csv" + in_time + "--json > found.json").exit_code, 0);
   const Outcome applied = folder.run(discover + "--apply found.json other_s.csv other_m.csv -o c.csv");
   ASSERT_EQ(applied.exit_code, 0) << applied.err;
