@@ -15,6 +15,8 @@ struct ApplyArguments {
   std::string found;                ///< file of `llmt discover --json`
   std::string simulated;            ///< file with inputs and simulated outputs; may be empty where only code is written
   std::string measured;             ///< file with measured outputs, or empty
+  std::string time;                 ///< column with the times of the rows; empty: as in the search
+  std::string group;                ///< column with their runs; empty: as in the search
   std::string parameters;           ///< derivatives at these rows, or empty
   bool parameters_are_set = false;  ///< the simulated outputs have the changes of parameters already
   std::string corrected;            ///< file to write, or empty

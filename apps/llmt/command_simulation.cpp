@@ -40,10 +40,16 @@ Eigen::MatrixXd CommandSimulation::run(const Eigen::MatrixXd& rows, const Eigen:
     constant += fmt::format(",{}", value);
     given.push_back(fmt::format("{} = {}", parameters[k].name, number(value)));
   }
+  for (const LabelColumn& label : labels) header.push_back(csv_field(label.name));
   std::string table = fmt::format("{}\n", fmt::join(header, ","));
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
     const Eigen::VectorXd row = rows.row(i);
-    table += fmt::format("{}{}\n", fmt::join(row.begin(), row.end(), ","), constant);
+    table += fmt::format("{}{}", fmt::join(row.begin(), row.end(), ","), constant);
+    for (const LabelColumn& label : labels) {
+      table += ',';
+      table += csv_field(label.cells[i]);
+    }
+    table += '\n';
   }
   const std::string what = fmt::format("--simulate \"{}\" at {}", command, fmt::join(given, ", "));
   const ChildOutcome outcome = run_child(command, table, seconds);

@@ -5,19 +5,22 @@
 #include <string>
 #include <vector>
 
+#include "llmt/compared_tables.hpp"
 #include "llmt/discovery/simulation.hpp"
 
 namespace llmt::apps {
 
 /// One run of the command for each evaluation. It gets a CSV table on standard input: a header, and a row for each row
-/// of the inputs with the inputs, then the values of all parameters. It writes a CSV table with a header to standard
-/// output, that has the columns `outputs` and as many rows, in the same order. Numbers have a decimal point.
+/// of the inputs with the inputs, then the values of all parameters, then the labels. It writes a CSV table with a
+/// header to standard output, that has the columns `outputs` and as many rows, in the same order. Numbers have a
+/// decimal point.
 struct CommandSimulation {
   std::string command;
   double seconds = 60.0;  ///< longest time of a run
   std::vector<discovery::Parameter> parameters;
   std::vector<std::string> inputs;
   std::vector<std::string> outputs;
+  std::vector<LabelColumn> labels = {};  ///< times and runs of the rows
 
   /// Of the parameters.
   Eigen::VectorXd nominal() const;

@@ -23,13 +23,26 @@ struct ComparedTables {
   DecimalMark mark = DecimalMark::point;
 };
 
+/// A column that says of each row when it was taken, or of which run it is, as its cells stand in the file.
+struct LabelColumn {
+  std::string name;
+  std::vector<std::string> cells;
+};
+
 /// Both tables, row by row.
 struct Comparison {
   discovery::Inputs inputs;  ///< with the order, if that is a column of its own
   Eigen::MatrixXd simulated;
   discovery::MeasuredOutputs measured;
   std::vector<Eigen::Index> lines;  ///< of the rows, in the file measured
+  std::vector<LabelColumn> labels;  ///< time and group, as far as they are given
 };
+
+/// Times of the rows. Throws std::runtime_error for a cell that is not a number.
+Eigen::VectorXd instants_of(const Csv& csv, const std::string& column);
+
+/// The run that each row is of, numbered as they first occur.
+std::vector<Eigen::Index> runs_of(const Csv& csv, const std::string& column);
 
 /// Throws std::invalid_argument for names that are given twice or contradict each other.
 void check_names(const ComparedTables& tables);

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "llmt/compared_tables.hpp"
+
 namespace llmt::apps {
 
 /// Rows of inputs and outputs, before and after.
@@ -16,9 +18,11 @@ struct CorrectedTable {
   Eigen::MatrixXd simulated;  ///< n x d
   Eigen::MatrixXd corrected;  ///< n x d
   Eigen::MatrixXd measured;   ///< n x d, or empty
+  std::vector<LabelColumn> labels = {};
 };
 
-/// Writes a column for each input, and for each output those whose names end with _simulated, _corrected and _measured.
+/// Writes the labels that are no inputs, a column for each input, and for each output those whose names end with
+/// _simulated, _corrected and _measured.
 void write_corrected(const std::string& path, const CorrectedTable& table);
 
 }  // namespace llmt::apps

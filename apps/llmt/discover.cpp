@@ -77,6 +77,20 @@ std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& argument
   return terms;
 }
 
+// A column that nobody measured is often all zeros.
+std::vector<std::string> notes_on_constants(const Comparison& comparison) {
+  std::vector<std::string> notes;
+  for (std::size_t o = 0; o < comparison.measured.names.size(); ++o) {
+    const auto measured = comparison.measured.values.col(static_cast<Eigen::Index>(o)).array();
+    if ((measured != measured(0)).any() ||
+        (comparison.simulated.col(static_cast<Eigen::Index>(o)).array() == measured(0)).all())
+      continue;
+    notes.push_back(fmt::format("{} was measured as {} at every row, whatever was simulated: check the column",
+                                comparison.measured.names[o], number(measured(0))));
+  }
+  return notes;
+}
+
 report::TermsSummary discovered(const DiscoverArguments& arguments, const Comparison& comparison,
                                 const Source& source) {
   const auto adjusts = [&](const char* what) {
@@ -96,7 +110,8 @@ report::TermsSummary discovered(const DiscoverArguments& arguments, const Compar
                                .without_nominal = source.table.without_nominal,
                                .counted = "line",
                                .failing_lines = {},
-                               .time = arguments.time};
+                               .time = arguments.time,
+                               .group = arguments.group};
   std::vector<discovery::UntestableCause> untestable;
   try {
     const std::vector<discovery::ModelTerm> terms = terms_to_try(arguments, comparison, untestable);
@@ -123,6 +138,7 @@ report::TermsSummary discovered(const DiscoverArguments& arguments, const Compar
     throw std::runtime_error(fmt::format("{}: {}", arguments.measured, error.what()));
   }
   for (discovery::UntestableCause& entry : untestable) summary.missing.not_testable.push_back(std::move(entry));
+  for (const std::string& note : notes_on_constants(comparison)) summary.missing.notes.push_back(note);
   for (const Eigen::Index row : summary.missing.outliers) summary.outlier_lines.push_back(comparison.lines[row]);
   for (const Eigen::Index row : summary.missing.failing_rows) summary.failing_lines.push_back(comparison.lines[row]);
   summary.regions = report::gap_regions(comparison.inputs, comparison.measured, summary.missing);
@@ -162,6 +178,8 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
                   {.found = arguments.simulation.apply,
                    .simulated = arguments.simulated,
                    .measured = arguments.measured,
+                   .time = arguments.time,
+                   .group = arguments.group,
                    .parameters = arguments.simulation.parameters,
                    .parameters_are_set = arguments.simulation.parameters_are_set,
                    .corrected = "",
@@ -200,6 +218,10 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
   }
   if (simulates) {
     source.command = command_simulation(arguments.simulation, comparison.inputs.names, arguments.outputs);
+    for (const LabelColumn& label : comparison.labels) {
+      if (std::ranges::find(arguments.inputs, label.name) == arguments.inputs.end())
+        source.command.labels.push_back(label);
+    }
     comparison.simulated = source.command.run(comparison.inputs.values, source.command.nominal());
     arguments.simulated = "--simulate";
   }
@@ -207,8 +229,9 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
   const report::TermsSummary summary = discovered(arguments, comparison, source);
   const bool is_worse = discovery::is_worse(summary.missing);
   if (!arguments.corrected.empty() && !is_worse) {
-    write_corrected(arguments.corrected, {comparison.inputs.names, arguments.outputs, comparison.inputs.values,
-                                          comparison.simulated, summary.missing.corrected, comparison.measured.values});
+    write_corrected(arguments.corrected,
+                    {comparison.inputs.names, arguments.outputs, comparison.inputs.values, comparison.simulated,
+                     summary.missing.corrected, comparison.measured.values, comparison.labels});
   }
   if (!arguments.simulation.code.empty() && !is_worse) {
     write_code(arguments.simulation.code, report::found_terms(report::terms_json(summary), arguments.measured));

@@ -131,31 +131,43 @@ def sines(rng, machine, t):
     return machine.mean + np.sin(angles) @ sizes, np.cos(angles) @ (sizes * frequencies)
 
 
-def record(name, changes, effects, rng, seconds, rate):
+def references(rng, name, seconds):
+    """What the machine is to do: times, position and velocity at each step, and the speed of a fan."""
     machine = MACHINES[name]
-    p = {**machine.parameters, **dict(changes)}
-    h, every = machine.step, round(1 / (machine.step * rate))
-    t = np.arange(0, seconds, h)
+    t = np.arange(0, seconds, machine.step)
     position, velocity = sines(rng, machine, t)
     fan = 0.5 + 0.4 * np.sin(np.outer(t, 2 * np.pi * rng.uniform(0.001, 0.004, 2)) + rng.uniform(0, 6, 2)).mean(axis=1)
+    return t, position, velocity, fan
+
+
+def move(name, changes, effects, reference, every=1, forces=None, start=None):
+    """Signals of every so many steps of a machine that follows a reference, or replays forces from a start.
+
+    `effects` are as in EFFECTS; of a machine with two bodies those of the kind "own" act on the first alone. `forces` holds one value for each step, `start` position and velocity of each body.
+    """
+    machine = MACHINES[name]
+    p = {**machine.parameters, **dict(changes)}
+    t, position, velocity, fan = reference
+    h = machine.step
     inertia = machine.inertia(p)
-    start = (0.0, float(position[0])) if machine.follows_speed else (float(position[0]), float(velocity[0]))
-    bodies = [list(start) for _ in inertia]
-    chosen = [EFFECTS[name][effect] for effect in effects]
+    if start is None:
+        first = (0.0, float(position[0])) if machine.follows_speed else (float(position[0]), float(velocity[0]))
+        start = [first for _ in inertia]
+    bodies = [list(body) for body in start]
     rows = []
     for k in range(len(t)):
         x = {"q": bodies[0][0], "v": bodies[0][1], "fan": fan[k]}
         if len(bodies) > 1:
             x |= {"q_b": bodies[1][0], "v_b": bodies[1][1]}
-        u = machine.drive(position[k], velocity[k], x)
+        u = machine.drive(position[k], velocity[k], x) if forces is None else forces[k]
         needed, dry = list(machine.needed(p, x)), list(machine.dry(p, x))
-        for kind, function in chosen:
+        for kind, function in effects:
             force = function(p, x)
             if kind == "dry":
-                dry[0] += force
+                dry[0] = max(0.0, dry[0] + force)
             else:
                 needed[0] += force
-                if len(bodies) > 1:
+                if len(bodies) > 1 and kind == "needed":
                     needed[1] -= force
         before = x["v"]
         for body, (mass, force, level) in enumerate(zip(inertia, needed, dry)):
@@ -167,8 +179,14 @@ def record(name, changes, effects, rng, seconds, rate):
             rows.append(x | (machine.extra(p, x) if machine.extra else {}))
         for body in bodies:
             body[0] += h * body[1]
-    signals = {key: np.array([float(row[key]) for row in rows]) for key in rows[0]}
-    return renamed(machine, signals)
+    return {key: np.array([float(row[key]) for row in rows]) for key in rows[0]}
+
+
+def record(name, changes, effects, rng, seconds, rate):
+    machine = MACHINES[name]
+    chosen = [EFFECTS[name][effect] for effect in effects]
+    every = round(1 / (machine.step * rate))
+    return renamed(machine, move(name, changes, chosen, references(rng, name, seconds), every))
 
 
 def renamed(machine, x):

@@ -1,23 +1,23 @@
-"""Does what was named repair the simulation? Motions of a run that nobody has seen, in rad (m for the cart).
+"""Does what was named repair the simulation? Motions of a run that nobody has seen, in rad (m for slides).
 
-    python bench/logs/motion.py --program build/release/bin/llmt --cases c1_all1,a_all1 --seeds 3
+    python bench/logs/motion.py --program build/release/bin/llmt --time --parameters --seeds 3
+    python bench/logs/motion.py --program build/release/bin/llmt --time --parameters --sysid --cases c1_all1,a_all1
 
-For each case and seed the program reads the log of run 0, and the real machine makes run 1000. Three models make it
-again: the nominal one; the nominal one with parameters fitted to the log of run 0 by least squares, which knows of no
-missing term; and the nominal one with the terms and parameters that the program named. A column is the root mean square
-difference of the joint's position to the real run:
+For each case and seed the program reads the log of run 0, and the real machine makes run 1000. Models make it again: the
+nominal one; the nominal one with parameters alone, fitted to the same table by least squares and, with --sysid, by
+mujoco.sysid to the motion of run 0; and the nominal one with what the program named (repair.py). A column is the root
+mean square difference of the first joint's position to the real run:
 
     open     the real torques, in windows of 1 s that begin at the real position and velocity
     closed   the machine's own controller follows the same reference
 
-A term is torque that the motion needs, so that its negative is applied (qfrc_applied). Dry friction goes into
-dof_frictionloss, a term of the acceleration into a mass or an armature, a term of the velocity into the damping. A term
-that is neither, such as one of the row before, cannot act in a simulation. It is left out and listed.
+A run is worse if a difference grows by more than 0.1 % of the nominal one and by more than 1e-6 rad or m.
 """
 
 import argparse
 import json
 import pathlib
+import statistics
 import subprocess
 import tempfile
 
@@ -26,91 +26,11 @@ import numpy as np
 import logs
 import machines
 import score
+from repair import FITTED, Model, fitted_parameters, is_of_mujoco, repaired
 
 HELD_OUT = 1000
 SECONDS = 8.0
-# What a table of torques can tell about the parameters, and nearly nothing else.
-FITTED = {"cart": ("m", "b", "f"), "arm": ("m1", "m2", "b1", "f1")}
-# Terms that are parameters of the model.
-AS_PARAMETER = {
-    "cart": {"linear ddq": "m", "linear dq": "b", "sign dq": "f"},
-    "arm": {"linear ddq1": "a1", "linear dq1": "b1", "sign dq1": "f1"},
-}
-# Functions of one signal x with a coefficient a and a constant c, under the names of docs/discovery-generic.md.
-OF_ONE = {
-    "linear": lambda x, a: a * x,
-    "square": lambda x, a: a * x * x,
-    "cube": lambda x, a: a * x**3,
-    "absolute": lambda x, a: a * abs(x),
-    "signed_square": lambda x, a: a * x * abs(x),
-    "step": lambda x, a, c: a * (x > c),
-    "hinge": lambda x, a, c: a * max(0.0, x - c),
-    "hinge_below": lambda x, a, c: a * max(0.0, c - x),
-    "wave": lambda x, a, b, period: a * np.cos(2 * np.pi * x / period) + b * np.sin(2 * np.pi * x / period),
-}
-FRICTION = {
-    "stribeck": lambda v, a, c: a * np.exp(-((v / c) ** 2)),
-    "tanh": lambda v, a, c: a * abs(np.tanh(v / c)),
-}
-
-
-def reader(name):
-    """The function (q, dq) -> signal of this name, None for a signal that is neither."""
-    joint = int(name[-1]) - 1 if name[-1].isdigit() else 0
-    kind = name.rstrip("0123456789")
-    if kind == "q":
-        return lambda q, dq: q[joint]
-    return (lambda q, dq: dq[joint]) if kind == "dq" else None
-
-
-def effect_of(family, place, values):
-    """The Effect of a named term on the first joint, None where a simulation cannot have it."""
-    names = place.split(",") if place else []
-    signals = [reader(name) for name in names]
-    if None in signals:
-        return None
-    if family == "offset":
-        return machines.Effect(0, needed=lambda q, dq: values[0])
-    if family in FRICTION and names[0] in ("dq", "dq1"):
-        return machines.Effect(0, friction=lambda q, dq: FRICTION[family](dq[0], *values))
-    if family in OF_ONE and len(names) == 1:
-        return machines.Effect(0, needed=lambda q, dq: OF_ONE[family](signals[0](q, dq), *values))
-    if family == "product":
-        return machines.Effect(0, needed=lambda q, dq: values[0] * signals[0](q, dq) * signals[1](q, dq))
-    return None
-
-
-def repair(document, case):
-    """Changes of parameters, effects, and the terms left out, of an answer."""
-    nominal = machines.PARAMETERS[case.machine]
-    changes, effects, left_out = {}, [], []
-    for name, _, estimated in score.parameter_effects(document, case):
-        changes[name] = changes.get(name, 0.0) + score.values_of(estimated)[0]
-    of_parameters = [id(estimated) for _, _, estimated in score.parameter_effects(document, case)]
-    for effect in document["effects"]:
-        label, values = score.label(effect), score.values_of(effect)
-        if id(effect) in of_parameters:
-            continue
-        if label in AS_PARAMETER[case.machine]:
-            name = AS_PARAMETER[case.machine][label]
-            changes[name] = changes.get(name, 0.0) + values[0]
-        elif (made := effect_of(effect["name"], score.place(effect), values)) is not None:
-            effects.append(made)
-        else:
-            left_out.append(label)
-    return tuple((name, max(1e-6, nominal[name] + change)) for name, change in changes.items()), effects, left_out
-
-
-def fitted_parameters(case, log):
-    """Parameters alone, by least squares on the table."""
-    nominal = machines.PARAMETERS[case.machine]
-    columns = []
-    for name in FITTED[case.machine]:
-        half = 1e-3 * nominal[name]
-        up, down = (machines.simulate(case.machine, log.signals, ((name, nominal[name] + h),))[:, 0] for h in (half, -half))
-        columns.append((up - down) / (2 * half))
-    change = np.linalg.lstsq(np.column_stack(columns), log.measured - log.simulated, rcond=None)[0]
-    return tuple((name, max(1e-6, nominal[name] + c)) for name, c in zip(FITTED[case.machine], change))
+SMALLEST = 1e-6  # rad or m
 
 
 def answer(options, case, seed):
@@ -122,68 +42,186 @@ def answer(options, case, seed):
         return json.loads(done.stdout), log
 
 
+class OfMujoco:
+    """A machine of machines.py on the reference of a run."""
+
+    def __init__(self, case, seed, run):
+        self.machine = case.machine
+        self.step = machines.STEP
+        self.reference = machines.references(logs.generator(case.machine, seed, run), case.machine, SECONDS)
+        self.true = [machines.EFFECTS[case.machine][name] for name in case.effects]
+
+    def real(self, case):
+        every = round(1 / self.step)
+        parameters = machines.as_key(self.machine, case.changes)
+        rigid = self.machine != "elastic"
+        _, q, self.dq, self.ddq, self.u = machines.move(
+            self.machine, parameters, self.true, self.reference, rate=every, rigid=rigid
+        )
+        self.q = q
+        return q[:, 0]
+
+    def positions(self, model, part=None):
+        """Of the first joint at every step: of the whole run, or open loop in this part of it."""
+        parameters = machines.as_key(self.machine, model.changes)
+        reference, torques, start = self.reference, None, None
+        if part is not None:
+            reference, torques = tuple(x[part] for x in reference), self.u[part]
+            start = self.start(model, part.start, dict(parameters))
+        _, q, _, _, _ = machines.move(self.machine, parameters, model.effects, reference, rate=round(1 / self.step),
+                                      torques=torques, start=start, rigid=not model.has_spring)
+        return q[:, 0]
+
+    def start(self, model, k, p):
+        """The state at step k. The angle of a spring that nobody measured is that of the torque that it carries."""
+        if self.machine != "elastic":
+            return self.q[k], self.dq[k]
+        motor = self.q[k, :1], self.dq[k, :1]
+        if not model.has_spring:
+            return motor
+        twist = (p["armature"] * self.ddq[:, 0] + p["b"] * self.dq[:, 0] - self.u[:, 0]) / p["k"]
+        speed = np.gradient(twist, self.step)
+        return np.append(motor[0], twist[k]), np.append(motor[1], speed[k])
+
+
+class OfEquations:
+    """A machine of machines_of_ode.py, with the functions of OfMujoco."""
+
+    def __init__(self, case, seed, run):
+        self.source = logs.source(case.machine)
+        self.machine = case.machine
+        self.step = self.source.MACHINES[case.machine].step
+        self.reference = self.source.references(logs.generator(case.machine, seed, run), case.machine, SECONDS)
+        self.true = [self.source.EFFECTS[case.machine][name] for name in case.effects]
+
+    def real(self, case):
+        self.run = self.source.move(self.machine, case.changes, self.true, self.reference)
+        return self.run["q"]
+
+    def positions(self, model, part=None):
+        reference, forces, start = self.reference, None, None
+        if part is not None:
+            reference, forces = tuple(x[part] for x in reference), self.run["u"][part]
+            start = [tuple(self.run[name][part.start] for name in body) for body in (("q", "v"), ("q_b", "v_b"))
+                     if body[0] in self.run]
+        return self.source.move(self.machine, model.changes, model.effects, reference, forces=forces, start=start)["q"]
+
+
 class HeldOut:
     """The real run, and how far a model is from it."""
 
     def __init__(self, case, seed):
-        self.machine = case.machine
-        self.reference = machines.references(logs.generator(case.machine, seed, HELD_OUT), case.machine, SECONDS)
-        real = [machines.EFFECTS[case.machine][name] for name in case.effects]
-        every = round(1 / machines.STEP)
-        _, self.q, self.dq, _, self.u = machines.move(
-            case.machine, machines.as_key(case.machine, case.changes), real, self.reference, rate=every
-        )
+        self.machine = (OfMujoco if is_of_mujoco(case) else OfEquations)(case, seed, HELD_OUT)
+        self.q = self.machine.real(case)
 
-    def closed(self, changes, effects):
-        parameters = machines.as_key(self.machine, changes)
-        _, q, _, _, _ = machines.move(self.machine, parameters, effects, self.reference)
-        every = round(1 / (machines.STEP * machines.RATE))
-        return float(np.sqrt(np.mean((q[:, 0] - self.q[::every, 0]) ** 2)))
+    def closed(self, model):
+        return float(np.sqrt(np.mean((self.machine.positions(model) - self.q) ** 2)))
 
-    def open(self, changes, effects):
-        parameters = machines.as_key(self.machine, changes)
-        window = round(1 / machines.STEP)
-        every = round(1 / (machines.STEP * machines.RATE))
+    def open(self, model):
+        window = round(1 / self.machine.step)
         squares = []
         for begin in range(0, len(self.q), window):
             part = slice(begin, begin + window)
-            pieces = tuple(x[part] for x in self.reference)
-            start = (self.q[begin], self.dq[begin])
-            _, q, _, _, _ = machines.move(self.machine, parameters, effects, pieces, torques=self.u[part], start=start)
-            squares.append((q[:, 0] - self.q[part][::every, 0]) ** 2)
+            squares.append((self.machine.positions(model, part) - self.q[part]) ** 2)
         return float(np.sqrt(np.mean(np.concatenate(squares))))
 
 
-DEFAULT = (
-    "c1_all1,c1_all5,c2_all1,c2_all5,c1d_tau1,c2d_tau1,d_off_all1,a_all1,a_all5,arm_off_derivatives_all1,"
-    "ad_derivatives_all1"
-)
+def grows(after, before):
+    return after > before * 1.001 and after > before + SMALLEST
+
+
+def can_move(case):
+    """Tables of torques, of logs that are no longer than 20 s; a rigid belt's table says nothing of its two bodies."""
+    tables = ("two_encoders", "one_step", "rigid_belt", "second_derivatives", "ten_kilohertz")
+    return case.machine in FITTED and case.preparation not in tables and case.seconds <= 20.0 and not case.refused
+
+
+def judged(options, case, seed):
+    document, log = answer(options, case, seed)
+    run = HeldOut(case, seed)
+    models = {"nominal": Model(), "parameters": fitted_parameters(case, log)}
+    if options.sysid and is_of_mujoco(case):
+        import fit_by_sysid
+
+        models["sysid"] = fit_by_sysid.fitted(case, seed)
+    models["llmt"] = repaired(document, case)
+    errors = {name: (run.open(model), run.closed(model)) for name, model in models.items()}
+    worse = [name for name, error in errors.items() if any(grows(*pair) for pair in zip(error, errors["nominal"]))]
+    return {"case": case.name, "seed": seed, "verdict": document["verdict"], "errors": errors, "worse": worse,
+            "left_out": models["llmt"].left_out}
+
+
+NAMES = ("nominal", "parameters", "sysid", "llmt")
+
+
+def line(result):
+    cells = [f"{result['case']:30}{result['seed']:>5}"]
+    for loop in (0, 1):
+        errors = [result["errors"].get(name) for name in NAMES]
+        cells += [f"{error[loop]:>11.3g}" if error else f"{'-':>11}" for error in errors]
+    worse = "worse " if "llmt" in result["worse"] else ""
+    return "".join(cells) + f"  {worse}{', '.join(result['left_out'])}"
+
+
+def groups(results):
+    """Sums over runs by what the machine hides."""
+    cases = {case.name: case for case in logs.chosen("")}
+    kinds = {
+        "an effect": lambda c: c.truth and not c.changes,
+        "parameters": lambda c: c.changes and not c.effects,
+        "both": lambda c: c.effects and c.changes,
+        "an inner state": lambda c: c.inner,
+        "nothing": lambda c: score.is_complete(c) and not c.changes,
+    }
+    for kind, holds in kinds.items():
+        members = [r for r in results if holds(cases[r["case"]])]
+        if members:
+            yield kind, members
+
+
+def summary(results):
+    yield (f"{'hidden':16}{'runs':>6}" + "".join(f"{name + ' worse':>18}" for name in NAMES[1:])
+           + "   open loop, median of model / nominal: " + ", ".join(NAMES[1:]))
+    for kind, members in groups(results):
+        cells, ratios = [], []
+        for name in NAMES[1:]:
+            there = [r for r in members if name in r["errors"]]
+            cells.append(f"{sum(name in r['worse'] for r in there)}/{len(there)}" if there else "-")
+            shares = [r["errors"][name][0] / r["errors"]["nominal"][0] for r in there if r["errors"]["nominal"][0] > 1e-9]
+            ratios.append(f"{statistics.median(shares):.3g}" if shares else "-")
+        yield f"{kind:16}{len(members):>6}" + "".join(f"{cell:>18}" for cell in cells) + "   " + ", ".join(ratios)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", required=True)
-    parser.add_argument("--cases", default=DEFAULT, metavar="NAME,...", help="of the arm and the cart; default: %(default)s")
+    parser.add_argument("--cases", default="", metavar="NAME,...", help="default: all whose motion can be made again")
     parser.add_argument("--seeds", type=int, default=3, metavar="COUNT")
+    parser.add_argument("--first", type=int, default=1, metavar="SEED", help="the first of the seeds; default: %(default)s")
+    parser.add_argument("--sysid", action="store_true", help="fit parameters by mujoco.sysid too; minutes for a case")
     parser.add_argument("--time", action="store_true", help="name the columns of time and runs to the program")
     parser.add_argument("--parameters", action="store_true", help="give derivatives by --parameters, not as inputs")
     parser.add_argument("--options", default="", help="further options of the program, separated by blanks")
+    parser.add_argument("--results", type=pathlib.Path, metavar="FILE", help="JSON lines; what is in there is not run again")
     options = parser.parse_args()
-    print(f"{'case':30}{'seed':>5}{'open loop: nominal':>20}{'parameters':>12}{'llmt':>10}{'closed loop: nominal':>22}"
-          f"{'parameters':>12}{'llmt':>10}  worse, left out")
-    worse = total = 0
-    for case in logs.chosen(options.cases):
-        for seed in range(1, options.seeds + 1):
-            document, log = answer(options, case, seed)
-            changes, effects, left_out = repair(document, case)
-            run = HeldOut(case, seed)
-            models = [((), []), (fitted_parameters(case, log), []), (changes, effects)]
-            opened, closed = [run.open(*model) for model in models], [run.closed(*model) for model in models]
-            is_worse = opened[2] > opened[0] * 1.001 or closed[2] > closed[0] * 1.001
-            worse, total = worse + is_worse, total + 1
-            print(f"{case.name:30}{seed:>5}{opened[0]:>20.3g}{opened[1]:>12.3g}{opened[2]:>10.3g}{closed[0]:>22.3g}"
-                  f"{closed[1]:>12.3g}{closed[2]:>10.3g}  {'worse ' if is_worse else ''}{', '.join(left_out)}", flush=True)
-    print(f"worse than nominal in {worse} of {total}")
+    cases = [case for case in logs.chosen(options.cases) if can_move(case)]
+    kept = []
+    if options.results and options.results.exists():
+        kept = [json.loads(text) for text in options.results.read_text().splitlines()]
+    print(f"{'case':30}{'seed':>5}" + "".join(f"{loop + name:>11}" for loop in ("", "") for name in NAMES)
+          + "  open loop, then closed loop; left out")
+    results = []
+    for case in cases:
+        for seed in range(options.first, options.first + options.seeds):
+            done = [r for r in kept if (r["case"], r["seed"]) == (case.name, seed)]
+            results.append(done[0] if done else judged(options, case, seed))
+            print(line(results[-1]), flush=True)
+            if options.results and not done:
+                with options.results.open("a") as file:
+                    file.write(json.dumps(results[-1]) + "\n")
+    print()
+    for text in summary(results):
+        print(text)
 
 
 if __name__ == "__main__":

@@ -13,9 +13,11 @@ pytest.importorskip("scipy")
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "bench/logs"))
 
+import fit_by_sysid  # noqa: E402
 import logs  # noqa: E402
 import machines  # noqa: E402
 import motion  # noqa: E402
+import repair  # noqa: E402
 import score  # noqa: E402
 
 CASES = logs.all_cases()
@@ -128,13 +130,70 @@ def test_judge_takes_derivatives_for_parameters_under_either_name():
     assert verdict["alone"] and not verdict["parameters"] and verdict["cover"] == [2, 3]
 
 
-def test_true_effect_makes_the_model_move_as_the_machine():
-    case = CASES["c1d_tau1"]
-    answer = document(DRAG, effect("linear", "ddq", [0.5]), effect("linear", "dq", [0.4]), effect("rate", "q", [1.0]))
-    changes, effects, left_out = motion.repair(copy.deepcopy(answer), case)
-    assert left_out == ["rate q"] and dict(changes) == {"m": 3.5, "b": 1.4}
-    motion.SECONDS = 2.0
+def in_words(named, expression):
+    return named | {"expression": expression}
+
+
+TRUE = {
+    "c1d_tau1": (
+        in_words(DRAG, "1.5*(dq*abs(dq))"),
+        effect("linear", "ddq", [0.5]),
+        effect("linear", "dq", [0.4]),
+        in_words(effect("rate", "q", [1.0]), None),
+    ),
+    "c2_tau5": (in_words(effect("hinge", "q", [12.0, 0.25]), "12*(max(0, q - 0.25))"),),
+    "a_tau1": (in_words(effect("stribeck", "dq1", [1.0, 0.15]), "1*(sign(dq1)*exp(-((dq1/0.15)^2)))"),),
+    "gripper_tau5": (in_words(effect("sign_product", "dq,grip", [0.12]), "0.12*(sign(dq)*abs(grip))"),),
+    "gear_payload_tau5": (in_words(effect("harmonic1", "q", [2.5, 0.0]), "2.5*(cos(1*q)) + 0*(sin(1*q))"),),
+    "belt_hardening_tau5": (in_words(effect("cube", "stretch", [4e9]), "4e9*(stretch^3)"),),
+}
+
+
+@pytest.mark.parametrize("name", TRUE)
+def test_true_effects_make_the_model_move_as_the_machine(name, monkeypatch):
+    monkeypatch.setattr(motion, "SECONDS", 2.0)
+    case = CASES[name]
+    model = repair.repaired(document(*copy.deepcopy(TRUE[name]), unknown_all=[]), case)
+    assert model.left_out == (["rate q"] if name == "c1d_tau1" else [])
     run = motion.HeldOut(case, 1)
-    exact = [machines.EFFECTS["cart"]["drag"]]
-    assert run.closed(case.changes, exact) < 1e-9 and run.open(case.changes, exact) < 1e-9
-    assert run.open((), []) > 30 * run.open(changes, effects) and run.closed((), []) > 30 * run.closed(changes, effects)
+    assert run.open(model) < 1e-9 < 1e-6 < run.open(repair.Model())
+    assert run.closed(model) < 1e-9 < 1e-6 < run.closed(repair.Model())
+
+
+def test_a_spring_in_the_drive_makes_the_rigid_model_elastic(monkeypatch):
+    monkeypatch.setattr(motion, "SECONDS", 2.0)
+    spring = in_words(effect("drive_spring", "q", [1 / 150, 0.05 / 150, 0.3 / 150]), None)
+    model = repair.repaired(document(spring, verdict="an inner state", unknown_all=[]), CASES["b_all1"])
+    assert model.has_spring and dict(model.changes)["k"] == pytest.approx(150.0)
+    run = motion.HeldOut(CASES["b_all1"], 1)  # the damping of the spring stays unknown
+    assert run.open(model) < 0.2 * run.open(repair.Model())
+    assert run.closed(model) < 0.2 * run.closed(repair.Model())
+
+
+def test_what_the_answer_does_not_stand_for_is_not_put_into_the_model():
+    drag = in_words(DRAG, "1.5*(dq*abs(dq))")
+    for verdict in ("nothing missing", "failed on held-out rows"):
+        assert repair.repaired(document(drag, verdict=verdict, unknown_all=[]), CASES["c1_all1"]) == repair.Model()
+    unseen = repair.repaired(document(drag | {"shrinks_gap": False}, unknown_all=[]), CASES["c1_all1"])
+    assert not unseen.effects and unseen.left_out == ["signed_square dq (shrinks no gap)"]
+    delay = in_words(effect("delay", "", [0.01]) | {"inner_state": "a delay"}, None)
+    beside = repair.repaired(document(delay, drag, verdict="an inner state", unknown_all=[]), CASES["c1_all1"])
+    assert not beside.effects and beside.left_out == ["delay", "signed_square dq"]
+
+
+def test_parameters_alone_are_those_of_the_machine():
+    case = short("d_off_tau1", seconds=10.0, noise=0.0)
+    assert dict(repair.fitted_parameters(case, logs.log_of(case, 1)).changes) == pytest.approx(
+        {"m": 3.5, "b": 1.4, "f": 0.5}, rel=0.02
+    )
+
+
+def test_sysid_gets_the_machine_with_motors_and_sensors():
+    mujoco = pytest.importorskip("mujoco")
+    for machine in ("arm", "cart", "elastic"):
+        given = mujoco.MjModel.from_xml_string(fit_by_sysid.text_of(machine, {}))
+        nominal = machines.model(machine, machines.as_key(machine, ()))
+        assert given.nu == given.nv == nominal.nv and given.nsensordata == 2 * nominal.nv
+        assert np.array_equal(given.dof_damping, nominal.dof_damping)
+        assert np.array_equal(given.body_mass, nominal.body_mass)
+    assert mujoco.MjModel.from_xml_string(fit_by_sysid.text_of("arm", {"m1": 2.5})).body_mass[1] == 2.5

@@ -132,6 +132,11 @@ def test_a_result_has_a_picture_and_a_page(found):
     matplotlib.use("Agg")
     axes = found.plot()
     assert len(axes.lines[0].get_xdata()) == len(found.held_out) == found.gap["heldout_samples"]
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == [
+        f"parameters alone, root mean square {found.gap['before']:.3g}",
+        f"with terms, root mean square {found.gap['after']:.3g}",
+    ]
     assert "VERDICT" in found._repr_html_() and "power sqrt(draught)" in found._repr_html_()
 
 

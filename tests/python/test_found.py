@@ -133,3 +133,37 @@ def test_what_is_no_result_is_refused(found):
         llmt.load_found(evil)
     with pytest.raises(ValueError, match="language is 'java'"):
         found.code("java")
+
+
+def test_a_delay_is_applied_to_other_runs_by_their_times():
+    def log(seed, delay=0.012):
+        """A mass on a spring, whose measured force is late by the delay."""
+        rng = np.random.default_rng(seed)
+        time = 0.02 * np.arange(800)
+        omega, size = 2 * np.pi * np.array([0.1, 0.25, 0.4, 0.55, 0.7]), 0.3 / np.arange(1, 6)
+        phases = rng.uniform(0, 6, 5)
+
+        def motion(t):
+            angle = np.outer(t, omega) + phases
+            return {
+                "q": np.sin(angle) @ size,
+                "dq": np.cos(angle) @ (size * omega),
+                "ddq": -np.sin(angle) @ (size * omega**2),
+            }
+
+        def force(x):
+            return 40 * x["q"] + x["dq"] + 3 * x["ddq"]
+
+        return time, motion(time), force(motion(time)), force(motion(time - delay)) + 0.02 * rng.normal(size=800)
+
+    time, inputs, simulated, measured = log(1)
+    found = llmt.find_missing(inputs, simulated, measured, time=time)
+    assert [effect["name"] for effect in found.to_dict()["effects"]] == ["delay"]
+    np.testing.assert_allclose(found.correct(inputs, simulated, time=time), found.corrected[:, 0], atol=1e-9)
+    time, inputs, simulated, measured = log(2)
+    left = measured - found.correct(inputs, simulated, time=time)
+    assert np.std(left) < 0.4 * np.std(measured - simulated)
+    with pytest.raises(RuntimeError, match="depends on when the rows were taken, which is not given"):
+        found.correct(inputs, simulated)
+    with pytest.raises(ValueError, match=r"correct\(inputs, simulated, time=...\) has it"):
+        found.predict(inputs, simulated)

@@ -154,8 +154,8 @@ class Found:
 
     _question = {"input_names": ["x", "dx", "ddx"], "output_names": ["u"]}
 
-    def __init__(self, *terms):
-        self.terms = terms
+    def __init__(self, *terms, verdict="named", parameters=(), **marks):
+        self.terms, self.verdict, self.parameters, self.marks = terms, verdict, parameters, marks
 
     def to_dict(self):
         effects = [
@@ -166,9 +166,10 @@ class Found:
                 "formula": name,
                 "parameters": [{"value": value} for value in values],
             }
+            | self.marks
             for name, location, *values in self.terms
         ]
-        return {"simulation": [], "effects": effects}
+        return {"verdict": self.verdict, "parameters": self.parameters, "effects": effects}
 
 
 def test_terms_of_the_own_motion_become_fields():
@@ -213,3 +214,18 @@ def test_what_mujoco_cannot_take_is_named():
     with pytest.warns(UserWarning, match="gain of the output"):
         fixed, callback = lm.apply(Found(("gain", "", 0.1)), cart)
     assert callback is None
+
+
+def test_what_the_answer_does_not_stand_for_stays_as_it_was():
+    cart = mujoco.MjSpec.from_string(CART)
+    heavier = {"parameters": [{"name": "mass cart", "value": 3.01, "change": 0.01}]}
+    for verdict in ("nothing missing", "failed on held-out rows"):
+        fixed, callback = lm.apply(Found(("cube", "dx", 0.4), verdict=verdict, **heavier), cart)
+        assert callback is None and fixed.body("cart").mass == 3.0
+    delay = Found(("delay", "", 0.01), verdict="an inner state", inner_state="a delay", **heavier)
+    with pytest.warns(UserWarning, match=r"nothing is changed: .* inner state delay of the output"):
+        fixed, callback = lm.apply(delay, cart)
+    assert callback is None and fixed.body("cart").mass == 3.0
+    with pytest.warns(UserWarning, match=r"cube of dx .*did not shrink the gap"):
+        fixed, callback = lm.apply(Found(("cube", "dx", 0.4), shrinks_gap=False, **heavier), cart)
+    assert callback is None and fixed.body("cart").mass == 3.01

@@ -28,10 +28,13 @@ nb::dict names_of_found(const std::string& json) {
 }
 
 auto apply_found(const std::string& json, const Array& inputs, const Array& simulated,
-                 const std::map<std::string, Array>& derivatives) {
+                 const std::map<std::string, Array>& derivatives, const std::vector<double>& instants,
+                 const std::vector<Eigen::Index>& runs) {
   std::map<std::string, Eigen::MatrixXd> by;
   for (const auto& [name, values] : derivatives) by[name] = rows_of(values);
-  return array_of<double>(report::apply(report::found_terms(json, where), rows_of(inputs), rows_of(simulated), by));
+  const Eigen::Map<const Eigen::VectorXd> times(instants.data(), std::ssize(instants));
+  return array_of<double>(
+      report::apply(report::found_terms(json, where), rows_of(inputs), rows_of(simulated), by, {times, runs}));
 }
 
 std::string code_of_found(const std::string& json, bool python) {
@@ -44,7 +47,8 @@ std::string code_of_found(const std::string& json, bool python) {
 void add_found(nb::module_& module) {
   using nb::arg;
   module.def("names_of_found", &names_of_found, arg("json"));
-  module.def("apply_found", &apply_found, arg("json"), arg("inputs"), arg("simulated"), arg("derivatives"));
+  module.def("apply_found", &apply_found, arg("json"), arg("inputs"), arg("simulated"), arg("derivatives"),
+             arg("instants"), arg("runs"));
   module.def("code_of_found", &code_of_found, arg("json"), arg("python"));
 }
 

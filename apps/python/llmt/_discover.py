@@ -127,6 +127,7 @@ class Missing(Findings):
         self._callables = callables
         self._found: str = made["state"]
         self._measured: np.ndarray = question.pop("measured")
+        self._time: np.ndarray | None = question.pop("time")
         self.before: np.ndarray = made["before"]
         """The simulation at the measured rows, its own parameters adjusted; rows x outputs."""
         self.corrected: np.ndarray = made["corrected"]
@@ -159,6 +160,8 @@ class Missing(Findings):
         several. ``simulated``: its outputs there, where no callable was given."""
         from llmt import _core
 
+        if any("inner_state" in effect and effect["expression"] is None for effect in self._data["effects"]):
+            raise ValueError("what was found depends on the past of a run: correct(inputs, simulated, time=...) has it")
         rows, columns = _matrix(inputs, "inputs", "x")
         rows = _in_order(rows, columns, self._question["input_names"], _is_table(inputs))
         callable_ = self._callables["simulate"]
@@ -201,16 +204,21 @@ class Missing(Findings):
         return apply(self, spec)
 
     def plot(self, ax: Any = None) -> Any:
-        """Draws measured minus simulated on the rows set aside (all rows without any), before and after, of the first
-        output. Returns the axes of matplotlib, ``ax`` if it is given."""
+        """Draws measured minus simulated on the rows set aside (all rows without any), of the first output: with the
+        simulation's own parameters adjusted, and with the terms. The figures are those of the page. Returns the axes of
+        matplotlib, ``ax`` if it is given."""
         rows = self.held_out if len(self.held_out) else np.arange(len(self.before))
+        of_page = self._data["gap"]["outputs"][0]
+        adjusted = "parameters alone" if self._data["parameters"] else "before"
         gaps = {}
-        for label, values in (("before", self.before), ("after", self.corrected)):
+        for label, key, values in ((adjusted, "before", self.before), ("with terms", "after", self.corrected)):
             gap = self._measured[rows, 0] - values[rows, 0]
-            gaps[f"{label}, {np.sqrt(np.mean(gap**2)):.4g} root mean square"] = gap
+            size = np.sqrt(np.mean(gap**2)) if of_page[key] is None else of_page[key]
+            gaps[f"{label}, root mean square {size:.3g}"] = gap
         y = f"measured - simulated {self._question['output_names'][0]}"
         title = "Rows set aside" if len(self.held_out) else "All rows"
-        ax = draw_points(ax, rows, gaps, x="row", y=y, title=title)
+        at = rows if self._time is None else self._time[rows]
+        ax = draw_points(ax, at, gaps, x="row" if self._time is None else "time", y=y, title=title)
         ax.axhline(0.0, linewidth=0.5, color="black")
         return ax
 
@@ -392,7 +400,8 @@ def _search(
         report=progress,
     )
     callables = {"simulate": simulate, "terms": own, "parameters": parameters[1]}
-    return Missing(made, {**question, "measured": values}, kind, callables)
+    when = np.array(instants) if instants else None
+    return Missing(made, {**question, "measured": values, "time": when}, kind, callables)
 
 
 def _noise_of(given: Mapping[str, float] | str | None, inputs: list[str]) -> list[float]:

@@ -39,15 +39,19 @@ class Found:
         *,
         derivatives: Mapping[str, Any] | None = None,
         parameters_are_set: bool = False,
+        time: Any = None,
+        groups: Any = None,
     ) -> np.ndarray:
         """The simulated outputs with what was found, at other rows: n values, or n x outputs if there are several.
 
         ``inputs`` is a table or array with the columns :attr:`inputs`, ``simulated`` the outputs there. Where parameters
         of the simulation change, either ``derivatives`` has the derivatives of the outputs by each of them at these
-        rows, or ``parameters_are_set`` says that ``simulated`` was computed with their new values.
+        rows, or ``parameters_are_set`` says that ``simulated`` was computed with their new values. ``time`` and
+        ``groups`` are those of the rows, as :func:`llmt.discover` takes them: a delay or a spring in the drive depends
+        on the past of a run.
         """
         from llmt import _core
-        from llmt._discover import _in_order, _in_order_of_outputs, _is_table, _matrix
+        from llmt._discover import _in_order, _in_order_of_outputs, _in_time, _is_table, _matrix
 
         rows, columns = _matrix(inputs, "inputs", "x")
         rows = _in_order(rows, columns, self.inputs, _is_table(inputs))
@@ -67,11 +71,14 @@ class Found:
                 f"the parameter {missing[0]!r} changes: derivatives by it are needed, or parameters_are_set=True "
                 "where simulated was computed with its new value"
             )
+        instants, runs = _in_time(time, groups, len(rows), False)
         made = _core.apply_found(
             self._json,
             np.ascontiguousarray(rows),
             np.ascontiguousarray(values),
             {} if parameters_are_set else {name: np.ascontiguousarray(by) for name, by in given.items()},
+            instants,
+            runs,
         )
         return made[:, 0] if made.shape[1] == 1 else made
 

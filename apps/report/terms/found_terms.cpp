@@ -54,7 +54,12 @@ void read_terms(const Json& json, FoundTerms& found) {
     term.title = term.location.empty() ? term.family : term.family + " of " + term.location;
     term.output = output_place(found, effect.at("output").get<std::string>());
     term.expression = text_of(effect.at("expression"));
-    term.coefficient = effect.at("parameters").at(0).at("value").get<double>();
+    for (const Json& parameter : effect.at("parameters")) {
+      term.coefficients.push_back(parameter.at("value").get<double>());
+    }
+    if (term.coefficients.empty())
+      throw std::runtime_error(fmt::format("{}: {} has no values", found.file, term.title));
+    term.is_inner_state = effect.contains("inner_state") && term.expression.empty();
     found.terms.push_back(std::move(term));
   }
   for (const Json& shape : json.at("unknown_all")) {
@@ -85,16 +90,40 @@ void check_words(const FoundTerms& found) {
   }
 }
 
-// Values of a term at all rows. `base`: the output without terms.
+// Values of a term of the past at all rows. `outputs`: without terms.
+Eigen::VectorXd inner_state(const FoundTerms& found, const FoundTerms::Term& term, const discovery::Inputs& inputs,
+                            const Eigen::MatrixXd& outputs) {
+  if (inputs.instants.size() == 0 && !found.time.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: the term {} depends on when the rows were taken, which is not given", found.file, term.title));
+  }
+  const std::vector<std::string> names = found.output_names();
+  for (const discovery::ModelTerm& known : discovery::inner_state_terms(inputs, outputs, names)) {
+    const bool is_this = known.family == term.family && known.location == term.location &&
+                         known.output == names[term.output] && known.coefficients.size() == term.coefficients.size();
+    if (!is_this) continue;
+    const Eigen::VectorXd base = outputs.col(static_cast<Eigen::Index>(term.output));
+    const Eigen::Map<const Eigen::VectorXd> coefficients(term.coefficients.data(), std::ssize(term.coefficients));
+    return known.columns(discovery::rows_of(inputs, base), {}) * coefficients;
+  }
+  throw std::runtime_error(
+      fmt::format("{}: the term {} depends on the past and cannot be computed at these rows: it needs 60 rows or more, "
+                  "in which positions, speeds and accelerations can be told by their times",
+                  found.file, term.title));
+}
+
+// Values of a term at all rows. `outputs`: without terms.
 Eigen::VectorXd values_of(const FoundTerms& found, const FoundTerms::Term& term, const discovery::Inputs& inputs,
-                          const Eigen::VectorXd& base) {
+                          const Eigen::MatrixXd& outputs) {
+  const Eigen::VectorXd base = outputs.col(static_cast<Eigen::Index>(term.output));
+  if (term.is_inner_state) return inner_state(found, term, inputs, outputs);
   if (term.expression.empty()) {
     if (!is_history(term)) {
       throw std::runtime_error(fmt::format("{}: the term {} has no expression", found.file, term.title));
     }
     for (const discovery::ModelTerm& known : discovery::row_before_terms(inputs, term.location)) {
       if (known.family == term.family) {
-        return term.coefficient * known.columns(discovery::rows_of(inputs, base), {}).col(0);
+        return term.coefficients.front() * known.columns(discovery::rows_of(inputs, base), {}).col(0);
       }
     }
   }
@@ -135,6 +164,8 @@ std::vector<std::string> FoundTerms::output_names() const {
   return names;
 }
 
+bool FoundTerms::needs_time() const { return std::ranges::any_of(terms, &Term::is_inner_state); }
+
 FoundTerms found_terms(const std::string& json, const std::string& file) {
   Json parsed;
   try {
@@ -160,6 +191,10 @@ FoundTerms found_terms(const Json& json, const std::string& file) {
     check_words(found);
     if (found.outputs.empty()) throw std::runtime_error(fmt::format("{}: there are no outputs", file));
     found.order = json.at("order").get<std::string>();
+    if (json.contains("time")) {
+      found.time = json["time"].value("column", "");
+      found.group = json["time"].value("group", "");
+    }
     for (const Json& parameter : json.at("parameters")) read_parameter(parameter, found);
     read_terms(json, found);
   } catch (const Json::exception& error) {
@@ -169,8 +204,8 @@ FoundTerms found_terms(const Json& json, const std::string& file) {
 }
 
 Eigen::MatrixXd apply(const FoundTerms& found, const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simulated,
-                      const std::map<std::string, Eigen::MatrixXd>& derivatives) {
-  discovery::Inputs named{found.input_names(), inputs, found.order};
+                      const std::map<std::string, Eigen::MatrixXd>& derivatives, const RowTimes& times) {
+  discovery::Inputs named{found.input_names(), inputs, found.order, times.instants, times.runs};
   for (std::size_t j = 0; j < found.inputs.size(); ++j) {
     for (double& value : named.values.col(static_cast<Eigen::Index>(j))) {
       if (std::abs(value) < found.inputs[j].zero_band) value = 0.0;
@@ -190,7 +225,7 @@ Eigen::MatrixXd apply(const FoundTerms& found, const Eigen::MatrixXd& inputs, co
     const auto column = static_cast<Eigen::Index>(term.output);
     Eigen::VectorXd values;
     try {
-      values = values_of(found, term, named, base.col(column));
+      values = values_of(found, term, named, base);
     } catch (const ExpressionError& error) {
       throw std::runtime_error(fmt::format("{}: the term {}: {}", found.file, term.title, error.what()));
     }

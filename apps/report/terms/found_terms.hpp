@@ -32,8 +32,9 @@ struct FoundTerms {
     std::string family;
     std::string location;
     std::size_t output = 0;
-    std::string expression;    ///< of the whole term; empty: there is none, as for terms of the row before
-    double coefficient = 0.0;  ///< the first
+    std::string expression;  ///< of the whole term; empty: there is none, as for terms of the row before
+    std::vector<double> coefficients;
+    bool is_inner_state = false;  ///< it depends on the past of signals
   };
   struct Change {
     std::string parameter;
@@ -45,11 +46,21 @@ struct FoundTerms {
   std::vector<Input> inputs;
   std::vector<Output> outputs;
   std::string order;  ///< as discovery::Inputs::order
+  std::string time;   ///< column with the times of rows in time; may be empty
+  std::string group;  ///< column with their runs; may be empty
   std::vector<Term> terms;
   std::vector<Change> changes;  ///< of parameters of the simulation
 
   std::vector<std::string> input_names() const;
   std::vector<std::string> output_names() const;
+  /// Whether a term depends on when rows were taken.
+  bool needs_time() const;
+};
+
+/// When each row was taken, and in which run; empty: row by row, one run.
+struct RowTimes {
+  Eigen::VectorXd instants;
+  std::vector<Eigen::Index> runs;
 };
 
 /// Throws std::runtime_error that names `file` and what is wrong in it.
@@ -57,10 +68,10 @@ FoundTerms found_terms(const std::string& json, const std::string& file);
 FoundTerms found_terms(const Json& json, const std::string& file);
 
 /// The simulated outputs (n x d) with what was found, at the rows of inputs (columns as in FoundTerms::inputs).
-/// `derivatives`: n x d by each parameter, as far as its change is to be added. Throws std::runtime_error that names a
-/// term without an expression, or one that is not finite at a row.
+/// `derivatives`: n x d by each parameter, as far as its change is to be added. `times`: for terms of the past. Throws
+/// std::runtime_error that names a term without an expression, or one that is not finite at a row.
 Eigen::MatrixXd apply(const FoundTerms& found, const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simulated,
-                      const std::map<std::string, Eigen::MatrixXd>& derivatives = {});
+                      const std::map<std::string, Eigen::MatrixXd>& derivatives = {}, const RowTimes& times = {});
 
 /// The numbers of values of each input that lie outside of what was searched, in a sentence each.
 std::vector<std::string> outside_sentences(const FoundTerms& found, const Eigen::MatrixXd& inputs);

@@ -85,8 +85,11 @@ Json found_json(const discovery::FoundTerm& found, const TermsSummary& summary, 
   return json;
 }
 
-Json time_json(const discovery::TimeUse& time) {
-  return {{"found_out", time.found_out},
+Json time_json(const TermsSummary& summary) {
+  const discovery::TimeUse& time = summary.missing.time;
+  return {{"column", summary.time},
+          {"group", summary.group},
+          {"found_out", time.found_out},
           {"step", time.step},
           {"rows_per_sample", time.rows_per_sample},
           {"samples", time.samples},
@@ -236,7 +239,7 @@ Json terms_json(const TermsSummary& summary) {
                {"order", summary.order}};
   if (!missing.outliers.empty()) json["outlier_lines"] = summary.outlier_lines;
   if (!missing.failing_rows.empty()) json["failing_lines"] = summary.failing_lines;
-  if (missing.time.in_time) json["time"] = time_json(missing.time);
+  if (missing.time.in_time) json["time"] = time_json(summary);
   return json;
 }
 

@@ -46,6 +46,7 @@ struct TermsSummary {
   std::string counted = "line";                   ///< what `outlier_lines` are: lines of a file, or rows of a table
   std::vector<Eigen::Index> failing_lines = {};   ///< of missing.failing_rows, as `outlier_lines`
   std::string time = {};                          ///< column with the instants; may be empty
+  std::string group = {};                         ///< column with the runs; may be empty
 };
 
 /// Cuts the rows searched where the absolute deviation changes most, by a small tree.

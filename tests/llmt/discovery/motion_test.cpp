@@ -92,9 +92,7 @@ TEST(Motion, SpeedStaysAsItIsWhereTheAccelerationJumps) {
   Eigen::MatrixXd noisy = truth;
   add_noise(noisy, {1e-4, 0.02, 0.02}, 1);
   const SmoothedInputs smooth = smoothed(inputs_of(noisy), force(noisy));
-  if (smooth.change.size() == 0) return;  // or nothing is smoothed
-  // Beyond the narrowest window around a jump the speed is nowhere worse than it was.
-  EXPECT_LT((smooth.inputs.values.col(1) - truth.col(1)).cwiseAbs().maxCoeff(), 4.5 * 0.02);
+  EXPECT_EQ(smooth.inputs.values, noisy);
 }
 
 // Moves with rests between them, each at a constant acceleration and its opposite.

@@ -80,7 +80,9 @@ def apply(found: Missing, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | 
     ``stiffness``; friction that falls with speed becomes a ``frictionloss`` that the callback sets; other functions of a
     position or velocity become forces. ``callback(model, data)`` is to be called before each ``mj_step``, after
     ``qfrc_applied`` has been set. What MuJoCo cannot take (gains, shapes without a name, other terms of accelerations
-    or of several inputs) is left out with a warning that names it.
+    or of several inputs) is left out with a warning that names it, and so is a term that did not shrink the gap on the
+    rows set aside. Where nothing is missing, or where the answer is an inner state, the specification is copied as it
+    is: what stands beside a state was fitted with it.
     """
     question = found._question
     positions = _positions(question["input_names"])
@@ -91,6 +93,12 @@ def apply(found: Missing, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | 
             f"the model has {nominal.nv} joints, the result has {len(positions)} positions, {len(outputs)} outputs"
         )
     fixed = spec.copy()
+    answer = found.to_dict()
+    states = [_title(term) for term in answer["effects"] if "inner_state" in term]
+    if states:
+        warnings.warn(f"nothing is changed: MuJoCo cannot take the inner state {'; '.join(states)}", stacklevel=2)
+    if states or answer["verdict"] in ("nothing missing", "failed on held-out rows"):
+        return fixed, None
     joints = {joint.name: joint for joint in fixed.joints}
     spec_joints = [
         joints[nominal.joint(k).name] if nominal.joint(k).name in joints else fixed.joints[k] for k in range(nominal.nv)
@@ -98,17 +106,21 @@ def apply(found: Missing, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | 
     _set_spec(fixed, spec_joints, nominal, _fitted(found, nominal))
     correction = _Correction()
     left_out = []
-    for term in found.to_dict()["effects"]:
+    for term in answer["effects"]:
         values = [parameter["value"] for parameter in term["parameters"]]
-        if not _add_term(term, values, positions, outputs.index(term["output"]), spec_joints, correction):
-            left_out.append(
-                f"{term['name']} of {term['location'] or 'the output'} ({term['formula']}) on {term['output']}"
-            )
+        if not term.get("shrinks_gap", True):
+            left_out.append(f"{_title(term)}, which did not shrink the gap on the rows set aside")
+        elif not _add_term(term, values, positions, outputs.index(term["output"]), spec_joints, correction):
+            left_out.append(_title(term))
     if left_out:
-        warnings.warn(f"MuJoCo cannot take, left out: {'; '.join(left_out)}", stacklevel=2)
+        warnings.warn(f"left out of the model: {'; '.join(left_out)}", stacklevel=2)
     for joint, _ in correction.frictions:
         correction.friction_base[joint] = _first(spec_joints[joint], "frictionloss")
     return fixed, correction if correction else None
+
+
+def _title(term: Mapping[str, Any]) -> str:
+    return f"{term['name']} of {term['location'] or 'the output'} ({term['formula']}) on {term['output']}"
 
 
 def _fitted(found: Missing, nominal: Any) -> dict[str, float]:

@@ -30,18 +30,16 @@ std::vector<Recorded> recordings(const Rows& rows) {
 Derivatives::Derivatives(const Rows& rows, Eigen::Index half) : sequence_(rows.sequence) {
   const std::vector<Recorded> extent = recordings(rows);
   const auto n = std::ssize(sequence_);
-  first_.resize(n);
-  second_.resize(n);
+  stencils_.resize(n);
   Eigen::VectorXd before;
-  Eigen::MatrixXd inverse;
+  std::shared_ptr<const Eigen::MatrixXd> weights;
   for (Eigen::Index k = 0; k < n; ++k) {
     const Eigen::Index begin = std::max(extent[k].begin, k - half);
     const Eigen::Index end = std::min(extent[k].end, k + half + 1);
     // Beyond one end of a window a polynomial of high degree is anything.
     const Eigen::Index most_powers = end - begin == 2 * half + 1 ? 5 : 3;
     const Eigen::Index powers = std::min(most_powers, end - begin);
-    first_[k].begin = second_[k].begin = begin;
-    first_[k].weights = second_[k].weights = Eigen::VectorXd::Zero(std::max<Eigen::Index>(0, end - begin));
+    stencils_[k].begin = begin;
     if (powers < 2) continue;
     Eigen::VectorXd times(end - begin);
     for (Eigen::Index i = begin; i < end; ++i) {
@@ -54,20 +52,28 @@ Derivatives::Derivatives(const Rows& rows, Eigen::Index half) : sequence_(rows.s
       Eigen::MatrixXd basis = Eigen::MatrixXd::Ones(times.size(), powers);
       for (Eigen::Index q = 1; q < powers; ++q) basis.col(q) = basis.col(q - 1).cwiseProduct(times);
       // Times within -1 ... 1 and few powers: the normal equations lose few digits.
-      inverse = (basis.transpose() * basis).ldlt().solve(basis.transpose());
+      const Eigen::MatrixXd inverse = (basis.transpose() * basis).ldlt().solve(basis.transpose());
+      weights = std::make_shared<const Eigen::MatrixXd>(inverse.middleRows(1, std::min<Eigen::Index>(2, powers - 1)));
       before = times;
     }
-    first_[k].weights = inverse.row(1).transpose() / width;
-    if (powers > 2) second_[k].weights = 2.0 * inverse.row(2).transpose() / (width * width);
+    stencils_[k].width = width;
+    stencils_[k].weights = weights;
   }
 }
 
-Eigen::VectorXd Derivatives::apply(const std::vector<Stencil>& stencils, const Eigen::VectorXd& values) const {
+Eigen::VectorXd Derivatives::apply(int order, const Eigen::VectorXd& values) const {
   const Eigen::VectorXd in_time = values(sequence_);
   Eigen::VectorXd result = Eigen::VectorXd::Zero(values.size());
-  for (std::size_t k = 0; k < stencils.size(); ++k) {
-    const Stencil& own = stencils[k];
-    result(sequence_[k]) = own.weights.dot(in_time.segment(own.begin, own.weights.size()));
+  Eigen::VectorXd weights;
+  for (std::size_t k = 0; k < stencils_.size(); ++k) {
+    const Stencil& own = stencils_[k];
+    if (own.weights == nullptr || own.weights->rows() < order) continue;
+    if (order == 1) {
+      weights = own.weights->row(0).transpose() / own.width;
+    } else {
+      weights = 2.0 * own.weights->row(1).transpose() / (own.width * own.width);
+    }
+    result(sequence_[k]) = weights.dot(in_time.segment(own.begin, weights.size()));
   }
   return result;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "llmt/discovery/model_term.hpp"
@@ -24,20 +25,21 @@ class Derivatives {
  public:
   Derivatives(const Rows& rows, Eigen::Index half);
 
-  Eigen::VectorXd first(const Eigen::VectorXd& values) const { return apply(first_, values); }
-  Eigen::VectorXd second(const Eigen::VectorXd& values) const { return apply(second_, values); }
+  Eigen::VectorXd first(const Eigen::VectorXd& values) const { return apply(1, values); }
+  Eigen::VectorXd second(const Eigen::VectorXd& values) const { return apply(2, values); }
 
  private:
-  // The weights of the rows in a window.
+  // The rows in a window. Windows that are alike, as nearly all are at a constant rate, share their weights: a row for
+  // the first and one for the second coefficient of the polynomial, as far as there are any; null: none.
   struct Stencil {
     Eigen::Index begin = 0;  // place in the sequence
-    Eigen::VectorXd weights;
+    double width = 1.0;      // time that is 1 for the polynomial
+    std::shared_ptr<const Eigen::MatrixXd> weights;
   };
   std::vector<Eigen::Index> sequence_;
-  std::vector<Stencil> first_;
-  std::vector<Stencil> second_;
+  std::vector<Stencil> stencils_;
 
-  Eigen::VectorXd apply(const std::vector<Stencil>& stencils, const Eigen::VectorXd& values) const;
+  Eigen::VectorXd apply(int order, const Eigen::VectorXd& values) const;
 };
 
 /// The places in time by which no smooth signal changes much: the longest lag l at which

@@ -1,0 +1,195 @@
+// llmt discover on rows in time: their times and runs as columns, and what was found applied to other runs.
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "apps/program.hpp"
+#include "llmt/csv.hpp"
+#include "llmt/random.hpp"
+
+namespace discover_time_test {
+namespace {
+
+using nlohmann::json;
+using program::Folder;
+using program::Outcome;
+
+const std::string discover = LLMT_PROGRAM " discover ";
+constexpr double step = 0.02;  // s
+
+// Position, velocity and acceleration of a sum of sines.
+std::array<double, 3> motion(double t, int run) {
+  std::array<double, 3> x{};
+  for (int k = 0; k < 5; ++k) {
+    const double omega = 2.0 * std::numbers::pi * (0.1 + 0.15 * k);
+    const double phase = omega * t + 1.3 * k + 0.9 * run;
+    const double size = 0.3 / (1.0 + k);
+    x[0] += size * std::sin(phase);
+    x[1] += size * omega * std::cos(phase);
+    x[2] -= size * omega * omega * std::sin(phase);
+  }
+  return x;
+}
+
+double needed(const std::array<double, 3>& x) { return 40.0 * x[0] + x[1] + 3.0 * x[2]; }
+
+// Writes NAME_s.csv and NAME_m.csv: a mass on a spring, in `runs` runs. The measured force is late by `delay` s, and
+// has drag dq |dq| besides.
+void write_log(const Folder& folder, const std::string& name, int runs, int rows, double delay, double drag,
+               std::uint64_t seed) {
+  llmt::Random random(seed);
+  std::string simulated = "t,run,q,dq,ddq,u\n";
+  std::string measured = simulated;
+  for (int run = 0; run < runs; ++run) {
+    for (int i = 0; i < rows; ++i) {
+      const double t = step * i;
+      const std::array<double, 3> x = motion(t, run);
+      const double u = needed(motion(t - delay, run)) + drag * x[1] * std::abs(x[1]) + 0.02 * random.normal();
+      const std::string same = fmt::format("{},\"run {}\",{},{},{}", t, run + 1, x[0], x[1], x[2]);
+      simulated += fmt::format("{},{}\n", same, needed(x));
+      measured += fmt::format("{},{}\n", same, u);
+    }
+  }
+  folder.write(name + "_s.csv", simulated);
+  folder.write(name + "_m.csv", measured);
+}
+
+Eigen::VectorXd column(const Folder& folder, const std::string& file, const std::string& name) {
+  return llmt::Csv::read(folder.file(file)).numbers(name);
+}
+
+const std::string in_time = " -t u --time t --group run ";
+
+TEST(DiscoverInTime, CorrectedTablesKeepTimesAndRuns) {
+  const Folder folder;
+  write_log(folder, "log", 2, 300, 0.0, 1.5, 1);
+  const Outcome search = folder.run(discover + "log_s.csv log_m.csv" + in_time + "-o c.csv --json > found.json");
+  ASSERT_EQ(search.exit_code, 0) << search.err;
+  const llmt::Csv corrected = llmt::Csv::read(folder.file("c.csv"));
+  EXPECT_EQ(corrected.columns(),
+            (std::vector<std::string>{"t", "run", "q", "dq", "ddq", "u_simulated", "u_corrected", "u_measured"}));
+  EXPECT_EQ(corrected.texts("run"), llmt::Csv::read(folder.file("log_m.csv")).texts("run"));
+  EXPECT_EQ(column(folder, "c.csv", "t"), column(folder, "log_m.csv", "t"));
+  const json found = json::parse(llmt::read_file(folder.file("found.json")));
+  EXPECT_EQ(found["time"]["column"], "t");
+  EXPECT_EQ(found["time"]["group"], "run");
+}
+
+TEST(DiscoverInTime, ApplyPrintsTheGapOfEachRun) {
+  const Folder folder;
+  write_log(folder, "log", 2, 300, 0.0, 15.0, 1);
+  write_log(folder, "other", 3, 200, 0.0, 15.0, 2);
+  ASSERT_EQ(folder.run(discover + "log_s.csv log_m.csv" + in_time + "--json > found.json").exit_code, 0);
+  const Outcome applied = folder.run(discover + "--apply found.json other_s.csv other_m.csv -o c.csv");
+  ASSERT_EQ(applied.exit_code, 0) << applied.err;
+  for (const char* label : {"all", "run 1", "run 2", "run 3"}) {
+    EXPECT_NE(applied.out.find(fmt::format("u       {:<5}", label)), std::string::npos) << label << applied.out;
+  }
+  const json gaps = json::parse(folder.run(discover + "--apply found.json other_s.csv other_m.csv --json").out);
+  ASSERT_EQ(gaps["runs"].size(), 3U);
+  double squares = 0.0;
+  for (const json& gap : gaps["runs"]) squares += std::pow(gap["after"].get<double>(), 2.0) / 3.0;
+  EXPECT_NEAR(std::sqrt(squares), gaps["gap"][0]["after"].get<double>(), 1e-9);
+  EXPECT_LT(gaps["gap"][0]["after"].get<double>(), 0.2 * gaps["gap"][0]["before"].get<double>());
+  // One run of them is of a machine without drag.
+  write_log(folder, "free", 1, 200, 0.0, 0.0, 3);
+  const Outcome grown = folder.run(discover + "--apply found.json free_s.csv free_m.csv");
+  EXPECT_NE(grown.out.find("The gap of u is larger with what was found: it does not hold for these rows."),
+            std::string::npos)
+      << grown.out;
+}
+
+TEST(DiscoverInTime, ADelayIsAppliedToOtherRunsByTheirTimes) {
+  const Folder folder;
+  constexpr double delay = 0.012;
+  write_log(folder, "log", 2, 500, delay, 0.0, 1);
+  write_log(folder, "other", 3, 300, delay, 0.0, 2);
+  ASSERT_EQ(folder.run(discover + "log_s.csv log_m.csv" + in_time + "-o c.csv --json > found.json").exit_code, 0);
+  const json found = json::parse(llmt::read_file(folder.file("found.json")));
+  ASSERT_EQ(found["effects"].size(), 1U) << found;
+  EXPECT_EQ(found["effects"][0]["name"], "delay");
+  // At the rows of the search it is what the search has written, and elsewhere it is the delay.
+  ASSERT_EQ(folder.run(discover + "--apply found.json log_s.csv -o again.csv").exit_code, 0);
+  EXPECT_LT((column(folder, "again.csv", "u_corrected") - column(folder, "c.csv", "u_corrected")).cwiseAbs().maxCoeff(),
+            1e-9);
+  const json gaps = json::parse(folder.run(discover + "--apply found.json other_s.csv other_m.csv --json").out);
+  EXPECT_LT(gaps["gap"][0]["after"].get<double>(), 0.3 * gaps["gap"][0]["before"].get<double>());
+  EXPECT_LT(gaps["gap"][0]["after"].get<double>(), 0.025);
+  // Times and runs under other names; none at all; too few rows.
+  folder.run("sed 's/^t,run/seconds,trial/' other_s.csv > named.csv");
+  ASSERT_EQ(folder.run(discover + "--apply found.json named.csv -o n.csv --time seconds --group trial").exit_code, 0);
+  ASSERT_EQ(folder.run(discover + "--apply found.json other_s.csv -o o.csv").exit_code, 0);
+  EXPECT_EQ(column(folder, "n.csv", "u_corrected"), column(folder, "o.csv", "u_corrected"));
+  const Outcome without = folder.run(discover + "--apply found.json named.csv -o n.csv");
+  EXPECT_EQ(without.exit_code, 1);
+  EXPECT_NE(without.err.find("named.csv: there is no column \"t\", as in the search; terms of found.json depend on the "
+                             "past of a run (--time COLUMN names it)"),
+            std::string::npos)
+      << without.err;
+  folder.run("head -20 other_s.csv > few.csv");
+  const Outcome few = folder.run(discover + "--apply found.json few.csv -o n.csv");
+  EXPECT_EQ(few.exit_code, 1);
+  EXPECT_NE(few.err.find("the term delay depends on the past and cannot be computed at these rows"), std::string::npos)
+      << few.err;
+}
+
+TEST(DiscoverInTime, ACommandGetsTimesAndRuns) {
+  const Folder folder;
+  write_log(folder, "log", 2, 300, 0.0, 1.5, 1);
+  folder.write("mass.awk",
+               "BEGIN { FS = \",\" }\n"
+               "NR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i; print \"u\"; next }\n"
+               "$at[\"t\"] == \"\" || $at[\"run\"] !~ /^run [12]$/ { exit 3 }\n"
+               "{ printf \"%.10g\\n\", 40 * $at[\"q\"] + $at[\"dq\"] + $at[\"mass\"] * $at[\"ddq\"] }\n");
+  const Outcome outcome =
+      folder.run(discover + "log_m.csv" + in_time + "--parameter mass=3 --simulate 'awk -f mass.awk' --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(json::parse(outcome.out)["effects"][0]["name"], "signed_square");
+}
+
+TEST(DiscoverInTime, MistakesInTimesAreNamedWithTheirLines) {
+  const Folder folder;
+  write_log(folder, "log", 2, 60, 0.0, 1.5, 1);
+  folder.run("awk -F, -v OFS=, 'NR > 1 { $1 = 1000 * $1 } 1' log_s.csv > ms.csv");
+  folder.run("awk -F, -v OFS=, 'NR > 1 { $1 = $1 + 1000 } 1' log_s.csv > later.csv");
+  folder.run("awk -F, -v OFS=, 'NR == 3 { $1 = \"2026-01-01\" } 1' log_m.csv > date.csv");
+  folder.run("awk -F, -v OFS=, 'NR == 9 { $1 = 0.12 } 1' log_m.csv > twice.csv");
+  struct Case {
+    std::string arguments;
+    std::string message;
+  };
+  const std::vector<Case> cases = {
+      {"log_s.csv log_m.csv -t u --inputs q,dq --time t",
+       "log_m.csv:62: column \"t\" is 0, as in line 2; rows of a run are taken one after the other (--group COLUMN"},
+      {"log_s.csv twice.csv -t u --inputs q,dq --time t --group run",
+       "twice.csv:9: column \"t\" is 0.12, as in line 8; rows of a run are taken one after the other\n"},
+      {"log_s.csv date.csv -t u --inputs q,dq --time t --group run",
+       "date.csv:3: column \"t\": '2026-01-01' is not a number (--time takes numbers"},
+      {"ms.csv log_m.csv -t u --inputs q,dq --time t --group run",
+       "log_m.csv:3: column \"t\" is 0.02 after the first row, but 20 in ms.csv; rows must stand in the same order in "
+       "both files, and times have one unit"},
+  };
+  for (const Case& entry : cases) {
+    const Outcome outcome = folder.run(discover + entry.arguments);
+    EXPECT_EQ(outcome.exit_code, 1) << entry.arguments << outcome.out;
+    EXPECT_NE(outcome.err.find(entry.message), std::string::npos) << entry.arguments << "\n" << outcome.err;
+  }
+  // A clock of its own is no mistake.
+  EXPECT_EQ(folder.run(discover + "later.csv log_m.csv -t u --inputs q,dq,ddq --time t --group run").exit_code, 0);
+}
+
+TEST(DiscoverInTime, AColumnThatWasNotMeasuredIsNoted) {
+  const Folder folder;
+  write_log(folder, "log", 1, 200, 0.0, 0.0, 1);
+  folder.run("awk -F, -v OFS=, 'NR > 1 { $6 = 0 } 1' log_m.csv > zero.csv");
+  const Outcome outcome = folder.run(discover + "log_s.csv zero.csv" + in_time);
+  EXPECT_NE(outcome.out.find("u was measured as 0 at every row, whatever was simulated: check the column"),
+            std::string::npos)
+      << outcome.out;
+}
+
+}  // namespace
+}  // namespace discover_time_test
