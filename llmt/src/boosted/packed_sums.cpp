@@ -32,8 +32,8 @@ PackedSum packed(double residual, double weight, const PackedUnits& units) {
 
 void add_to(Histogram& histogram, const BinnedFeature& feature, std::span<const int> rows,
             std::span<const PackedSum> terms) {
-  const std::uint8_t* const codes = feature.codes.data();
-  for (std::size_t k = 0; k < rows.size(); ++k) histogram[codes[rows[k]]] += terms[k];
+  const std::uint8_t* const bins = feature.bins.data();
+  for (std::size_t k = 0; k < rows.size(); ++k) histogram[bins[rows[k]]] += terms[k];
 }
 
 }  // namespace llmt

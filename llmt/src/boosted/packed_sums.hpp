@@ -39,7 +39,7 @@ inline std::int64_t weight_of(PackedSum sum) {
 inline std::int64_t residual_of(PackedSum sum) { return sum - (weight_of(sum) << residual_bits); }
 
 /// The sums in the bins of a feature; the last one is that of missing values.
-using Histogram = std::array<PackedSum, 256>;
+using Histogram = std::array<PackedSum, most_bins + 1>;
 
 /// Adds the rows `rows`, whose terms are `terms`, to the bins of a feature.
 void add_to(Histogram& histogram, const BinnedFeature& feature, std::span<const int> rows,
