@@ -40,14 +40,22 @@ TreeGrower::Choice TreeGrower::refined(std::span<const int> leaves, Choice choic
   parallel_for(std::ssize(leaves), max_threads_, [&](Eigen::Index i) {
     const GrowingNode& node = tree_[leaves[i]];
     LeafSums& of_this = sums[i];
+    SideSums all;
+    SideSums left;
+    const std::uint16_t* const cells = column.cells.data();
+    const float* const values = column.values.data();
+    const int missing_at = choice.missing_left ? -1 : missing_cell;  // before or behind all cells
     for (Eigen::Index k = node.begin; k < node.end; ++k) {
       const int row = order_[k];
-      const int cell = column.cells[row];
-      const RowOfWindow one{cell, static_cast<int>(i), weights_[k], residuals_[k], column.values[row]};
-      of_this.all.add(one.weight, one.residual, one.z);
-      if (cell == missing_cell ? choice.missing_left : cell < first) of_this.left.add(one.weight, one.residual, one.z);
-      if (cell >= first && cell <= last) of_leaf[i].push_back(one);
+      const int cell = cells[row] == missing_cell ? missing_at : cells[row];
+      const double w = weights_[k];
+      const double z = values[row];
+      all.add(w, residuals_[k], z);
+      left.add(cell < first ? w : 0.0, residuals_[k], z);  // without a branch, which no processor could foresee
+      if (cell >= first && cell <= last) of_leaf[i].push_back({cell, static_cast<int>(i), w, residuals_[k], z});
     }
+    of_this.all = all;
+    of_this.left = left;
     of_this.slope = may_have_slope(node, choice.feature);
     of_this.gain = of_this.gain_of_sides(options_.ridges);
   });
