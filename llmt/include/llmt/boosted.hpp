@@ -20,7 +20,7 @@
 namespace llmt {
 
 struct BoostOptions {
-  /// Factor on every tree. 0: 0.05 below 10 000 rows, else 0.07; 0.3 where the trees are soft.
+  /// Factor on every tree. 0: 0.05 below 10 000 rows, else 0.07; 0.1 where the trees are soft.
   double rate = 0.0;
   int max_rounds = 2000;   ///< trees of an output at most, before the sum is fitted to all rows
   std::uint64_t seed = 1;  ///< of the rows that are held out, and of the features that a split looks at

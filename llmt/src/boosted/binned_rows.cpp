@@ -31,25 +31,25 @@ double halfway(double low, double high) {
   return middle < high ? middle : low;
 }
 
-// A value that is heavier than a bin has one of its own; the others share the bins that are left.
-std::vector<double> edges_of(const std::vector<Distinct>& values) {
-  std::vector<double> edges;
-  double left = 0.0;
-  for (const Distinct& one : values) left += one.weight;
-  int bins_left = most_bins;
-  double in_bin = 0.0;
-  for (std::size_t k = 0; k + 1 < values.size(); ++k) {
-    in_bin += values[k].weight;
-    const double size = left / bins_left;
-    const bool all_fit = values.size() <= static_cast<std::size_t>(most_bins);
-    if (!all_fit && in_bin + values[k + 1].weight / 2.0 < size) continue;
-    if (std::ssize(edges) + 1 == most_bins) break;
-    edges.push_back(halfway(values[k].value, values[k + 1].value));
-    left -= in_bin;
-    in_bin = 0.0;
-    --bins_left;
+// Cuts weights in a row into at most `most` parts of about equal weight, and returns the last index of each part. What
+// is heavier than a part is one of its own; the others share the parts that are left.
+std::vector<int> cut(const std::vector<double>& weights, int most) {
+  std::vector<int> last;
+  const int count = static_cast<int>(weights.size());
+  double left = std::accumulate(weights.begin(), weights.end(), 0.0);
+  int parts_left = most;
+  double in_part = 0.0;
+  for (int k = 0; k + 1 < count; ++k) {
+    in_part += weights[k];
+    if (count > most && in_part + weights[k + 1] / 2.0 < left / parts_left) continue;
+    if (std::ssize(last) + 1 == most) break;
+    last.push_back(k);
+    left -= in_part;
+    in_part = 0.0;
+    --parts_left;
   }
-  return edges;
+  if (count > 0) last.push_back(count - 1);
+  return last;
 }
 
 }  // namespace
@@ -62,28 +62,46 @@ BinnedFeature bin_feature(BoostedFeature feature, const Eigen::VectorXd& values,
     result.low = distinct.front().value;
     result.high = distinct.back().value;
   }
-  result.edges = edges_of(distinct);
-  const std::size_t bins = result.edges.size() + 1;
-  std::vector<double> sums(bins, 0.0);
-  std::vector<double> of_bin(bins, 0.0);
-  std::size_t bin = 0;
-  for (const Distinct& one : distinct) {
-    while (bin < result.edges.size() && one.value > result.edges[bin]) ++bin;
-    sums[bin] += one.weight * one.value;
-    of_bin[bin] += one.weight;
+  std::vector<double> weights_of_values;
+  for (const Distinct& one : distinct) weights_of_values.push_back(one.weight);
+  std::vector<double> weights_of_cells;
+  std::vector<double> sums_of_cells;
+  int value = 0;
+  for (const int last : cut(weights_of_values, most_cells)) {
+    weights_of_cells.push_back(0.0);
+    sums_of_cells.push_back(0.0);
+    for (; value <= last; ++value) {
+      weights_of_cells.back() += distinct[value].weight;
+      sums_of_cells.back() += distinct[value].weight * distinct[value].value;
+    }
+    if (value < std::ssize(distinct)) result.edges.push_back(halfway(distinct[last].value, distinct[value].value));
   }
-  for (std::size_t b = 0; b < bins; ++b) result.centres.push_back(of_bin[b] > 0.0 ? sums[b] / of_bin[b] : 0.0);
-  result.codes.resize(values.size());
+  result.last_cells = cut(weights_of_cells, most_bins);
+  std::vector<std::uint8_t> bin_of_cell;
+  for (const int last : result.last_cells) {
+    double weight = 0.0;
+    double sum = 0.0;
+    while (std::ssize(bin_of_cell) <= last) {
+      weight += weights_of_cells[bin_of_cell.size()];
+      sum += sums_of_cells[bin_of_cell.size()];
+      bin_of_cell.push_back(static_cast<std::uint8_t>(result.centres.size()));
+    }
+    result.centres.push_back(weight > 0.0 ? sum / weight : 0.0);
+  }
+  result.cells.resize(values.size());
+  result.bins.resize(values.size());
   result.values.resize(values.size());
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     if (std::isnan(values(i))) {
-      result.codes[i] = missing_code;
+      result.cells[i] = missing_cell;
+      result.bins[i] = missing_bin;
       result.values[i] = 0.0F;
       result.has_missing = true;
       continue;
     }
-    result.codes[i] =
-        static_cast<std::uint8_t>(std::ranges::lower_bound(result.edges, values(i)) - result.edges.begin());
+    result.cells[i] =
+        static_cast<std::uint16_t>(std::ranges::lower_bound(result.edges, values(i)) - result.edges.begin());
+    result.bins[i] = bin_of_cell[result.cells[i]];
     result.values[i] = static_cast<float>(values(i));
   }
   return result;

@@ -10,26 +10,31 @@
 
 namespace llmt {
 
-/// Bins of present values; a code beyond them is a missing value.
-inline constexpr int most_bins = 255;
-inline constexpr std::uint8_t missing_code = 255;
+/// A split lies between two cells. It is found between two bins, which are neighbouring cells put together, and then
+/// refined. A number beyond the cells or bins is that of a missing value.
+inline constexpr int most_cells = 65535;
+inline constexpr int most_bins = 128;
+inline constexpr std::uint16_t missing_cell = most_cells;
+inline constexpr std::uint8_t missing_bin = most_bins;
 
-/// A feature in all rows. Bin b holds edges[b - 1] < z <= edges[b].
+/// A feature in all rows. Cell c holds edges[c - 1] < z <= edges[c].
 struct BinnedFeature {
   BoostedFeature feature;
-  std::vector<double> edges;        ///< ascending, one fewer than bins
-  std::vector<double> centres;      ///< mean of the values in each bin
-  std::vector<std::uint8_t> codes;  ///< bin of each row
-  std::vector<float> values;        ///< z of each row, 0 where it is missing
+  std::vector<double> edges;         ///< ascending, one fewer than cells
+  std::vector<int> last_cells;       ///< of each bin
+  std::vector<double> centres;       ///< mean of the values in each bin
+  std::vector<std::uint16_t> cells;  ///< of each row
+  std::vector<std::uint8_t> bins;    ///< of each row
+  std::vector<float> values;         ///< z of each row, 0 where it is missing
   bool has_missing = false;
   double low = 0.0;  ///< smallest value
   double high = 0.0;
 
-  int bins() const { return static_cast<int>(centres.size()); }
+  int num_bins() const { return static_cast<int>(centres.size()); }
 };
 
-/// Cuts values into at most most_bins bins of about equal weight. An edge lies halfway between two neighbouring
-/// values. NaN: missing.
+/// Cuts values into cells, one for each value if there are at most most_cells, and these into at most most_bins bins;
+/// else cells or bins have about equal weight. An edge lies halfway between two neighbouring values. NaN: missing.
 BinnedFeature bin_feature(BoostedFeature feature, const Eigen::VectorXd& values, const Eigen::VectorXd& weights);
 
 /// The rows of a fit.

@@ -17,11 +17,11 @@ void visit(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row, in
   while (tree[index].feature >= 0) {
     const GrowingNode& node = tree[index];
     const BinnedFeature& column = rows.features[node.feature];
-    const std::uint8_t code = column.codes[row];
-    if (node.half_width > 0.0 && code != missing_code) {
+    const std::uint16_t cell = column.cells[row];
+    if (node.half_width > 0.0 && cell != missing_cell) {
       const double z = column.values[row];
-      if (std::abs(z - column.edges[node.bin]) < node.half_width) {
-        const double right = share_of_right(z, column.edges[node.bin], node.half_width);
+      if (std::abs(z - column.edges[node.cell]) < node.half_width) {
+        const double right = share_of_right(z, column.edges[node.cell], node.half_width);
         if (goes_both_ways(share, right)) {
           visit(tree, rows, row, node.left, share * (1.0 - right), to);
           share *= right;
@@ -30,7 +30,7 @@ void visit(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row, in
         }
       }
     }
-    index = (code == missing_code ? node.missing_left : code <= node.bin) ? node.left : node.right;
+    index = (cell == missing_cell ? node.missing_left : cell <= node.cell) ? node.left : node.right;
   }
   to(index, share);
 }
@@ -130,17 +130,53 @@ void TreeGrower::hold_empty(GrowingNode& leaf, const Eigen::VectorXd& residuals)
   }
 }
 
-void TreeGrower::fit_leaves(const Eigen::VectorXd& residuals) {
-  soft_rows_.clear();
-  if (is_soft(tree_)) {
-    soft_rows_.resize(tree_.size());
-    for (const int row : of_rows_) {
-      visit(tree_, rows_, row, 0, 1.0, [&](int leaf, double share) {
-        soft_rows_[leaf].rows.push_back(row);
-        soft_rows_[leaf].shares.push_back(share);
-      });
+// The same shares as visit(), node by node.
+void TreeGrower::share_rows() {
+  if (soft_rows_.size() < tree_.size()) soft_rows_.resize(tree_.size());
+  soft_rows_[0].rows = of_rows_;
+  soft_rows_[0].shares.assign(of_rows_.size(), 1.0);
+  for (std::size_t index = 0; index < tree_.size(); ++index) {
+    const GrowingNode& node = tree_[index];
+    if (node.feature < 0) continue;
+    const BinnedFeature& column = rows_.features[node.feature];
+    const double threshold = column.edges[node.cell];
+    const SoftRows& here = soft_rows_[index];
+    SoftRows& left = soft_rows_[node.left];
+    SoftRows& right = soft_rows_[node.right];
+    for (SoftRows* side : {&left, &right}) {
+      side->rows.resize(here.rows.size());
+      side->shares.resize(here.rows.size());
     }
+    std::size_t in_left = 0;
+    std::size_t in_right = 0;
+    // Without branches, which no processor could foresee: the row is written to both sides, and counts where it
+    // belongs.
+    for (std::size_t k = 0; k < here.rows.size(); ++k) {
+      const int row = here.rows[k];
+      const double share = here.shares[k];
+      const std::uint16_t cell = column.cells[row];
+      const double z = column.values[row];
+      const bool is_missing = cell == missing_cell;
+      const bool is_right = is_missing ? !node.missing_left : cell > node.cell;
+      const double soft = share_of_right(z, threshold, node.half_width);
+      const bool both = !is_missing & (std::abs(z - threshold) < node.half_width) & goes_both_ways(share, soft);
+      const double to_right = both ? soft : (is_right ? 1.0 : 0.0);
+      left.rows[in_left] = right.rows[in_right] = row;
+      left.shares[in_left] = share * (1.0 - to_right);
+      right.shares[in_right] = share * to_right;
+      in_left += both | !is_right ? 1 : 0;
+      in_right += both | is_right ? 1 : 0;
+    }
+    left.rows.resize(in_left);
+    left.shares.resize(in_left);
+    right.rows.resize(in_right);
+    right.shares.resize(in_right);
   }
+}
+
+void TreeGrower::fit_leaves(const Eigen::VectorXd& residuals) {
+  is_soft_ = is_soft(tree_);
+  if (is_soft_) share_rows();
   parallel_for(std::ssize(tree_), max_threads_, [&](Eigen::Index k) {
     if (tree_[k].feature >= 0) return;
     const auto [rows, shares] = rows_in(tree_, static_cast<int>(k));
@@ -153,7 +189,7 @@ void TreeGrower::fit_leaves(const Eigen::VectorXd& residuals) {
 }
 
 TreeGrower::RowsInLeaf TreeGrower::rows_in(const GrowingTree& tree, int leaf) const {
-  if (!soft_rows_.empty()) return {soft_rows_[leaf].rows, soft_rows_[leaf].shares};
+  if (is_soft_) return {soft_rows_[leaf].rows, soft_rows_[leaf].shares};
   return {std::span(order_).subspan(tree[leaf].begin, tree[leaf].count()), {}};
 }
 
@@ -168,7 +204,7 @@ void TreeGrower::subtract_last(const GrowingTree& tree, double rate, Eigen::Vect
     }
   };
   // A row is in one leaf of a crisp tree, and may be in several of a soft one.
-  parallel_for(std::ssize(tree), soft_rows_.empty() ? max_threads_ : 1, subtract);
+  parallel_for(std::ssize(tree), is_soft_ ? 1 : max_threads_, subtract);
 }
 
 double value_at(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row) {
@@ -187,7 +223,7 @@ BoostedTree finished(const GrowingTree& tree, const BinnedRows& rows) {
     if (node.feature >= 0) {
       number[k] = static_cast<int>(result.splits.size());
       result.splits.push_back(
-          {node.feature, rows.features[node.feature].edges[node.bin], node.half_width, node.missing_left, 0, 0});
+          {node.feature, rows.features[node.feature].edges[node.cell], node.half_width, node.missing_left, 0, 0});
     } else {
       number[k] = -1 - static_cast<int>(result.leaves.size());
       result.leaves.push_back({node.model.constant, node.low, node.high, node.model.features, node.model.slopes});

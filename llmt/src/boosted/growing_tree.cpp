@@ -31,12 +31,9 @@ void TreeGrower::begin(const Eigen::VectorXd& residuals) {
   root.end = std::ssize(order_);
   root.model.constant = sum / weight;
   for (std::size_t k = 0; k < order_.size(); ++k) residuals_[k] = residuals(order_[k]) - root.model.constant;
-  tree_ = {root};
-}
-
-void TreeGrower::pack() {
   units_ = units_of(residuals_, weights_, rows_.equal_weights);
   for (std::size_t k = 0; k < order_.size(); ++k) terms_[k] = packed(residuals_[k], weights_[k], units_);
+  tree_ = {root};
 }
 
 std::vector<int> TreeGrower::some_features(Random& random) const {
@@ -73,8 +70,8 @@ TreeGrower::Choice TreeGrower::best_of_feature(std::span<const int> leaves, int 
   }
   Choice best{0.0, -1, 0, false};
   const auto look = [&](const Gains& of_side, bool missing_left) {
-    for (int t = 0; t + 1 < column.bins(); ++t) {
-      if (of_side[t] > best.gain) best = {of_side[t], feature, t, missing_left};
+    for (int t = 0; t + 1 < column.num_bins(); ++t) {
+      if (of_side[t] > best.gain) best = {of_side[t], feature, column.last_cells[t], missing_left};
     }
   };
   look(gains, false);
@@ -95,22 +92,25 @@ TreeGrower::Choice TreeGrower::best_split(std::span<const int> leaves, const std
 
 void TreeGrower::split_rows(int index) {
   GrowingNode& node = tree_[index];
-  const std::vector<std::uint8_t>& codes = rows_.features[node.feature].codes;
+  const std::vector<std::uint16_t>& cells = rows_.features[node.feature].cells;
+  const bool has_weights = !rows_.equal_weights;
   // Rows of the right side wait in the same places of the spare lists: other nodes have other places.
   Eigen::Index left = node.begin;
   Eigen::Index right = node.begin;
   for (Eigen::Index k = node.begin; k < node.end; ++k) {
-    const std::uint8_t code = codes[order_[k]];
-    const bool is_left = code == missing_code ? node.missing_left : code <= node.bin;
+    const std::uint16_t cell = cells[order_[k]];
+    const bool is_left = cell == missing_cell ? node.missing_left : cell <= node.cell;
     spare_order_[right] = order_[left] = order_[k];
     spare_residuals_[right] = residuals_[left] = residuals_[k];
-    spare_weights_[right] = weights_[left] = weights_[k];
+    if (has_weights) spare_weights_[right] = weights_[left] = weights_[k];
     left += is_left ? 1 : 0;
     right += is_left ? 0 : 1;
   }
   std::copy(spare_order_.begin() + node.begin, spare_order_.begin() + right, order_.begin() + left);
   std::copy(spare_residuals_.begin() + node.begin, spare_residuals_.begin() + right, residuals_.begin() + left);
-  std::copy(spare_weights_.begin() + node.begin, spare_weights_.begin() + right, weights_.begin() + left);
+  if (has_weights) {
+    std::copy(spare_weights_.begin() + node.begin, spare_weights_.begin() + right, weights_.begin() + left);
+  }
   GrowingNode& l = tree_[node.left];
   GrowingNode& r = tree_[node.right];
   l.begin = node.begin;
@@ -149,18 +149,21 @@ void TreeGrower::add_to_path(GrowingNode& side, int feature) {
       side.model.slopes[found - side.model.features.begin()] += slope;
     }
   }
-  for (Eigen::Index k = side.begin; k < side.end; ++k) residuals_[k] -= constant + slope * values[order_[k]];
+  for (Eigen::Index k = side.begin; k < side.end; ++k) {
+    residuals_[k] -= constant + slope * values[order_[k]];
+    terms_[k] = packed(residuals_[k], weights_[k], units_);
+  }
 }
 
 double TreeGrower::half_width_of(int index) const {
   const GrowingNode& node = tree_[index];
   const BinnedFeature& column = rows_.features[node.feature];
-  const double threshold = column.edges[node.bin];
+  const double threshold = column.edges[node.cell];
   double low = column.low;
   double high = column.high;
   for (int below = index, above = node.parent; above >= 0; below = above, above = tree_[above].parent) {
     if (tree_[above].feature != node.feature) continue;
-    const double border = column.edges[tree_[above].bin];
+    const double border = column.edges[tree_[above].cell];
     if (tree_[above].left == below) {
       high = std::min(high, border);
     } else {
@@ -175,14 +178,14 @@ bool TreeGrower::blends_well(int index, double half_width) const {
   constexpr double allowed = 1.1;
   const GrowingNode& node = tree_[index];
   const BinnedFeature& column = rows_.features[node.feature];
-  const double threshold = column.edges[node.bin];
+  const double threshold = column.edges[node.cell];
   double crisp = 0.0;
   double blended = 0.0;
   for (Eigen::Index k = node.begin; k < node.end; ++k) {
     const Eigen::Index row = order_[k];
     const double z = column.values[row];
-    if (column.codes[row] == missing_code || std::abs(z - threshold) >= half_width) continue;
-    const bool is_left = column.codes[row] <= node.bin;
+    if (column.cells[row] == missing_cell || std::abs(z - threshold) >= half_width) continue;
+    const bool is_left = column.cells[row] <= node.cell;
     const double right_share = share_of_right(z, threshold, half_width);
     const GrowingNode& own = tree_[is_left ? node.left : node.right];
     const GrowingNode& other = tree_[is_left ? node.right : node.left];
@@ -201,7 +204,7 @@ void TreeGrower::split(std::span<const int> leaves, std::span<const Choice> choi
     child.model = tree_[leaves[k]].model;
     GrowingNode& node = tree_[leaves[k]];
     node.feature = choices[k].feature;
-    node.bin = choices[k].bin;
+    node.cell = choices[k].cell;
     node.missing_left = choices[k].missing_left;
     node.left = static_cast<int>(tree_.size());
     node.right = node.left + 1;
@@ -223,14 +226,13 @@ void TreeGrower::split(std::span<const int> leaves, std::span<const Choice> choi
 void TreeGrower::grow_symmetric(Random& random) {
   std::vector<int> leaves = {0};
   for (int level = 0; level < options_.depth; ++level) {
-    pack();
     const Choice best = best_split(leaves, some_features(random));
     if (best.feature < 0) continue;
     std::vector<int> with_rows;
     for (const int leaf : leaves) {
       if (tree_[leaf].count() > 0) with_rows.push_back(leaf);
     }
-    split(with_rows, std::vector<Choice>(with_rows.size(), best));
+    split(with_rows, std::vector<Choice>(with_rows.size(), refined(with_rows, best)));
     leaves.clear();
     for (const int node : with_rows) leaves.insert(leaves.end(), {tree_[node].left, tree_[node].right});
   }
@@ -238,21 +240,17 @@ void TreeGrower::grow_symmetric(Random& random) {
 
 void TreeGrower::grow_free(Random& random) {
   std::vector<Choice> best_of(1);
-  pack();
   const auto look = [&](int leaf) { best_of[leaf] = best_split(std::vector<int>{leaf}, some_features(random)); };
   look(0);
   for (int leaves = 1; leaves < options_.leaves; ++leaves) {
     const auto best = std::ranges::max_element(best_of, {}, &Choice::gain);
     if (best->feature < 0) return;
     const int leaf = static_cast<int>(best - best_of.begin());
-    split(std::vector<int>{leaf}, std::vector<Choice>{*best});
+    split(std::vector<int>{leaf}, std::vector<Choice>{refined(std::vector<int>{leaf}, *best)});
     best_of[leaf] = {0.0, -1, 0, false};
     best_of.resize(tree_.size());
     if (leaves + 1 == options_.leaves) return;
     const GrowingNode& node = tree_[leaf];
-    for (Eigen::Index k = node.begin; k < node.end; ++k) {
-      terms_[k] = packed(residuals_[k], weights_[k], units_);
-    }
     for (const int child : {node.left, node.right}) {
       if (static_cast<double>(tree_[child].count()) >= 2.0 * options_.fewest) look(child);
     }
@@ -276,7 +274,7 @@ GrowingTree TreeGrower::estimate(const GrowingTree& tree, const Eigen::VectorXd&
   std::vector<int> number(tree.size(), 0);
   for (std::size_t k = 0; k < tree.size(); ++k) {
     if (tree[k].feature < 0) continue;
-    split(std::vector<int>{number[k]}, std::vector<Choice>{{0.0, tree[k].feature, tree[k].bin, tree[k].missing_left}});
+    split(std::vector<int>{number[k]}, std::vector<Choice>{{0.0, tree[k].feature, tree[k].cell, tree[k].missing_left}});
     const GrowingNode& node = tree_[number[k]];
     number[tree[k].left] = node.left;
     number[tree[k].right] = node.right;

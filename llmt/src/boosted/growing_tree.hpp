@@ -39,7 +39,7 @@ struct PathModel {
 
 struct GrowingNode {
   int feature = -1;  ///< -1: a leaf
-  int bin = 0;       ///< the last one of the left side
+  int cell = 0;      ///< the last one of the left side
   bool missing_left = false;
   double half_width = 0.0;
   int left = -1;
@@ -79,7 +79,7 @@ class TreeGrower {
   struct Choice {
     double gain = 0.0;
     int feature = -1;
-    int bin = 0;
+    int cell = 0;  // the last one of the left side
     bool missing_left = false;
   };
 
@@ -93,10 +93,10 @@ class TreeGrower {
   };
 
   void begin(const Eigen::VectorXd& residuals);
-  void pack();
   std::vector<int> some_features(Random& random) const;
   Choice best_of_feature(std::span<const int> leaves, int feature) const;
   Choice best_split(std::span<const int> leaves, const std::vector<int>& features) const;
+  Choice refined(std::span<const int> leaves, Choice choice) const;
   bool may_have_slope(const GrowingNode& node, int feature) const;
   void split(std::span<const int> leaves, std::span<const Choice> choices);
   void split_rows(int node);
@@ -106,6 +106,7 @@ class TreeGrower {
   void grow_symmetric(Random& random);
   void grow_free(Random& random);
   void fit_leaves(const Eigen::VectorXd& residuals);
+  void share_rows();
   void fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::span<const double> shares,
                 const Eigen::VectorXd& residuals) const;
   RowsInLeaf rows_in(const GrowingTree& tree, int leaf) const;
@@ -123,8 +124,9 @@ class TreeGrower {
   std::vector<int> spare_order_;
   std::vector<double> spare_residuals_;
   std::vector<double> spare_weights_;
-  PackedUnits units_;
-  std::vector<SoftRows> soft_rows_;  // of each node that is a leaf; empty: the tree is crisp
+  PackedUnits units_;                // of the terms of a tree
+  std::vector<SoftRows> soft_rows_;  // of each node, if the tree is soft
+  bool is_soft_ = false;
 };
 
 }  // namespace llmt

@@ -23,17 +23,10 @@ PackedUnits units_of(std::span<const double> residuals, std::span<const double> 
   return units;
 }
 
-PackedSum packed(double residual, double weight, const PackedUnits& units) {
-  const auto whole_weight = static_cast<std::int64_t>(weight / units.weight + 0.5);
-  const double units_of_residual = std::clamp(residual * weight * units.per_residual, -units.most, units.most);
-  const auto whole_residual = static_cast<std::int64_t>(units_of_residual + std::copysign(0.5, units_of_residual));
-  return (whole_weight << residual_bits) + whole_residual;
-}
-
 void add_to(Histogram& histogram, const BinnedFeature& feature, std::span<const int> rows,
             std::span<const PackedSum> terms) {
-  const std::uint8_t* const codes = feature.codes.data();
-  for (std::size_t k = 0; k < rows.size(); ++k) histogram[codes[rows[k]]] += terms[k];
+  const std::uint8_t* const bins = feature.bins.data();
+  for (std::size_t k = 0; k < rows.size(); ++k) histogram[bins[rows[k]]] += terms[k];
 }
 
 }  // namespace llmt

@@ -4,7 +4,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -31,7 +33,12 @@ struct PackedUnits {
 /// Units in which the sums over all rows stay within their bits.
 PackedUnits units_of(std::span<const double> residuals, std::span<const double> weights, bool equal_weights);
 
-PackedSum packed(double residual, double weight, const PackedUnits& units);
+inline PackedSum packed(double residual, double weight, const PackedUnits& units) {
+  const auto whole_weight = static_cast<std::int64_t>(weight / units.weight + 0.5);
+  const double units_of_residual = std::clamp(residual * weight * units.per_residual, -units.most, units.most);
+  const auto whole_residual = static_cast<std::int64_t>(units_of_residual + std::copysign(0.5, units_of_residual));
+  return (whole_weight << residual_bits) + whole_residual;
+}
 
 inline std::int64_t weight_of(PackedSum sum) {
   return (sum + (std::int64_t{1} << (residual_bits - 1))) >> residual_bits;
@@ -39,7 +46,7 @@ inline std::int64_t weight_of(PackedSum sum) {
 inline std::int64_t residual_of(PackedSum sum) { return sum - (weight_of(sum) << residual_bits); }
 
 /// The sums in the bins of a feature; the last one is that of missing values.
-using Histogram = std::array<PackedSum, 256>;
+using Histogram = std::array<PackedSum, most_bins + 1>;
 
 /// Adds the rows `rows`, whose terms are `terms`, to the bins of a feature.
 void add_to(Histogram& histogram, const BinnedFeature& feature, std::span<const int> rows,

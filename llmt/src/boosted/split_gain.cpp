@@ -7,33 +7,25 @@
 namespace llmt {
 namespace {
 
-struct Totals {
-  double weight = 0.0;
-  double residual = 0.0;
-  double z = 0.0;
-  double zz = 0.0;
-  double ze = 0.0;
-};
-
 // Sums over the bins up to each one that holds rows: no gain changes at others. The bin of missing values comes first
 // if it goes to the left.
 struct RunningSums {
   int count = 0;
-  std::array<int, 257> bin;
-  std::array<double, 257> weight;
-  std::array<double, 257> residual;
-  std::array<double, 257> z;
-  std::array<double, 257> zz;
-  std::array<double, 257> ze;
-  Totals all = {};
+  std::array<int, most_bins + 1> bin;
+  std::array<double, most_bins + 1> weight;
+  std::array<double, most_bins + 1> residual;
+  std::array<double, most_bins + 1> z;
+  std::array<double, most_bins + 1> zz;
+  std::array<double, most_bins + 1> ze;
+  SideSums all = {};
 };
 
 void run(RunningSums& sums, const BinnedFeature& feature, const Histogram& histogram, const PackedUnits& units,
          bool missing_left) {
-  const double missing_weight = static_cast<double>(weight_of(histogram[missing_code])) * units.weight;
-  const double missing_residual = static_cast<double>(residual_of(histogram[missing_code])) * units.residual;
-  Totals all;
-  if (missing_left && histogram[missing_code] != 0) {
+  const double missing_weight = static_cast<double>(weight_of(histogram[missing_bin])) * units.weight;
+  const double missing_residual = static_cast<double>(residual_of(histogram[missing_bin])) * units.residual;
+  SideSums all;
+  if (missing_left && histogram[missing_bin] != 0) {
     all.weight = missing_weight;
     all.residual = missing_residual;
     sums.bin[0] = -1;
@@ -42,7 +34,7 @@ void run(RunningSums& sums, const BinnedFeature& feature, const Histogram& histo
     sums.z[0] = sums.zz[0] = sums.ze[0] = 0.0;
     sums.count = 1;
   }
-  const int bins = feature.bins();
+  const int bins = feature.num_bins();
   for (int b = 0; b < bins; ++b) {
     const PackedSum sum = histogram[b];
     const double weight = static_cast<double>(weight_of(sum)) * units.weight;
@@ -82,7 +74,7 @@ LLMT_INLINE Fraction gain_of(double n, double s, double z, double zz, double ze,
 // The gains where the left side ends with each bin that holds rows.
 LLMT_FOR_EACH_INSTRUCTION_SET
 void gains_at(double* __restrict gains, const RunningSums& sums, const Ridges& ridges, double slope) {
-  const Totals& all = sums.all;
+  const SideSums& all = sums.all;
   const double of_node = all.residual * all.residual / (all.weight + ridges.constant);
   for (int k = 0; k < sums.count; ++k) {
     const Fraction left = gain_of(sums.weight[k], sums.residual[k], sums.z[k], sums.zz[k], sums.ze[k], ridges, slope);
@@ -94,17 +86,22 @@ void gains_at(double* __restrict gains, const RunningSums& sums, const Ridges& r
 
 }  // namespace
 
+double side_gain(const SideSums& side, const Ridges& ridges, bool slope) {
+  const Fraction gain = gain_of(side.weight, side.residual, side.z, side.zz, side.ze, ridges, slope ? 1.0 : 0.0);
+  return gain.above / gain.below;
+}
+
 void add_gains(Gains& gains, const BinnedFeature& feature, const Histogram& histogram, const PackedUnits& units,
                const Ridges& ridges, bool slopes, bool missing_left) {
   RunningSums sums;
   run(sums, feature, histogram, units, missing_left);
-  std::array<double, 257> of_bin;
+  std::array<double, most_bins + 1> of_bin;
   gains_at(of_bin.data(), sums, ridges, slopes ? 1.0 : 0.0);
-  const Totals& all = sums.all;
+  const SideSums& all = sums.all;
   const Fraction unsplit = gain_of(all.weight, all.residual, all.z, all.zz, all.ze, ridges, slopes ? 1.0 : 0.0);
   double gain = unsplit.above / unsplit.below - all.residual * all.residual / (all.weight + ridges.constant);
   int t = 0;
-  const int thresholds = feature.bins() - 1;
+  const int thresholds = feature.num_bins() - 1;
   for (int k = 0; k < sums.count; ++k) {
     for (; t < std::min(sums.bin[k], thresholds); ++t) gains[t] += gain;
     gain = of_bin[k];

@@ -15,8 +15,31 @@ struct Ridges {
   double slope = 1.0;
 };
 
-/// A gain for every threshold of a feature: entry t is that of the edge t.
-using Gains = std::array<double, 256>;
+/// Sums over the rows on one side of a split: of weights w, of w e, w z, w z^2 and w z e.
+struct SideSums {
+  double weight = 0.0;
+  double residual = 0.0;
+  double z = 0.0;
+  double zz = 0.0;
+  double ze = 0.0;
+
+  void add(double w, double e, double of_z) {
+    weight += w;
+    residual += w * e;
+    z += w * of_z;
+    zz += w * of_z * of_z;
+    ze += w * of_z * e;
+  }
+  SideSums operator-(const SideSums& other) const {
+    return {weight - other.weight, residual - other.residual, z - other.z, zz - other.zz, ze - other.ze};
+  }
+};
+
+/// What the side explains, g in add_gains().
+double side_gain(const SideSums& side, const Ridges& ridges, bool slope);
+
+/// A gain for every threshold of a feature: entry t is that behind bin t.
+using Gains = std::array<double, most_bins>;
 
 /// Adds to `gains` what the thresholds of a feature gain in one node: with the residuals e and the feature's values z
 /// on one side,

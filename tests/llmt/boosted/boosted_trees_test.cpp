@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -65,7 +66,7 @@ double gain_of_side(const Rows& rows, int feature, const std::vector<int>& side,
   double s = 0.0;
   double mean = 0.0;
   const auto centre = [&](int row) {
-    return column.codes[row] == llmt::missing_code ? 0.0 : column.centres[column.codes[row]];
+    return column.bins[row] == llmt::missing_bin ? 0.0 : column.centres[column.bins[row]];
   };
   for (const int row : side) {
     n += rows.binned.weights(row);
@@ -87,17 +88,21 @@ TEST(BinnedFeature, HoldsEachRowBetweenItsEdges) {
   const Rows rows = some_rows(3000, 3, true, 0.1, 1);
   for (int j = 0; j < 3; ++j) {
     const llmt::BinnedFeature& feature = rows.binned.features[j];
-    EXPECT_LE(feature.bins(), llmt::most_bins);
-    EXPECT_EQ(feature.bins(), j == 1 ? 6 : llmt::most_bins);
+    EXPECT_EQ(feature.num_bins(), j == 1 ? 6 : llmt::most_bins);
+    EXPECT_EQ(feature.last_cells.back(), std::ssize(feature.edges));
     for (const int row : rows.all) {
       const double z = rows.z(row, j);
-      const int code = feature.codes[row];
+      const int cell = feature.cells[row];
+      const int bin = feature.bins[row];
       if (std::isnan(z)) {
-        EXPECT_EQ(code, llmt::missing_code);
+        EXPECT_EQ(cell, llmt::missing_cell);
+        EXPECT_EQ(bin, llmt::missing_bin);
         continue;
       }
-      EXPECT_TRUE(code == 0 || z > feature.edges[code - 1]);
-      EXPECT_TRUE(code + 1 == feature.bins() || z <= feature.edges[code]);
+      EXPECT_TRUE(cell == 0 || z > feature.edges[cell - 1]);
+      EXPECT_TRUE(cell == std::ssize(feature.edges) || z <= feature.edges[cell]);
+      EXPECT_TRUE(bin == 0 || cell > feature.last_cells[bin - 1]);
+      EXPECT_LE(cell, feature.last_cells[bin]);
     }
   }
 }
@@ -146,12 +151,12 @@ TEST(SplitGain, EqualsBruteForce) {
           llmt::Gains gains{};
           llmt::add_gains(gains, feature, histogram_of(feature, node, terms), units, ridges, slopes, missing_left);
           const double of_node = gain_of_side(rows, j, node, ridges, false);
-          for (int t = 0; t + 1 < feature.bins(); ++t) {
+          for (int t = 0; t + 1 < feature.num_bins(); ++t) {
             std::vector<int> left;
             std::vector<int> right;
             for (const int row : node) {
-              const int code = feature.codes[row];
-              (code == llmt::missing_code ? missing_left : code <= t) ? left.push_back(row) : right.push_back(row);
+              const int bin = feature.bins[row];
+              (bin == llmt::missing_bin ? missing_left : bin <= t) ? left.push_back(row) : right.push_back(row);
             }
             const double expected =
                 gain_of_side(rows, j, left, ridges, slopes) + gain_of_side(rows, j, right, ridges, slopes) - of_node;
@@ -212,7 +217,7 @@ void expect_ridges(const llmt::GrowingTree& tree, const Rows& rows, int index, c
   for (const bool is_left : {true, false}) {
     std::vector<int> side;
     for (const int row : held) {
-      if ((rows.binned.features[node.feature].codes[row] <= node.bin) == is_left) side.push_back(row);
+      if ((rows.binned.features[node.feature].cells[row] <= node.cell) == is_left) side.push_back(row);
     }
     const Path below = side.empty() ? path : ridge_about(path, rows, side, {node.feature}, ridges);
     expect_ridges(tree, rows, is_left ? node.left : node.right, side, below, ridges);
@@ -233,6 +238,34 @@ TEST(BoostedTree, HasInItsLeavesRidgeAboutTheirPath) {
     EXPECT_GT(tree.size(), 8U);
     const Path root{rows.binned.weights.dot(rows.y) / rows.binned.weights.sum(), Eigen::VectorXd::Zero(3)};
     expect_ridges(tree, rows, 0, rows.all, root, options.ridges);
+  }
+}
+
+// A step between two values of a bin: the split is between these values.
+TEST(BoostedTree, SplitsInsideOfABin) {
+  for (const bool symmetric : {true, false}) {
+    const Rows rows = some_rows(3000, 1, false, 0.1, 8);
+    for (const double step : {-0.301, 0.1, 0.502}) {
+      Eigen::VectorXd y(rows.z.rows());
+      double below = -std::numeric_limits<double>::infinity();
+      double above = -below;
+      for (const int row : rows.all) {
+        const double z = rows.z(row, 0);
+        y(row) = z > step ? 1.0 : 0.0;
+        if (z <= step) below = std::max(below, z);
+        if (z > step) above = std::min(above, z);
+      }
+      llmt::TreeOptions options;
+      options.symmetric = symmetric;
+      options.depth = 1;
+      options.leaves = 2;
+      options.columns = 1.0;
+      llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
+      llmt::Random random(1);
+      const llmt::GrowingTree tree = grower.grow(y, random);
+      ASSERT_EQ(tree.front().feature, 0);
+      EXPECT_EQ(rows.binned.features[0].edges[tree.front().cell], below + (above - below) / 2.0);
+    }
   }
 }
 

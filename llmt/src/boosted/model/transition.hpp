@@ -14,7 +14,7 @@ inline double share_of_right(double z, double threshold, double half_width) {
 /// the side on which the row lies takes all.
 inline bool goes_both_ways(double share, double right) {
   constexpr double smallest = 0.08;
-  return share * right >= smallest && share * (1.0 - right) >= smallest;
+  return (share * right >= smallest) & (share * (1.0 - right) >= smallest);
 }
 
 }  // namespace llmt
