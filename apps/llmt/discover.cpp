@@ -205,7 +205,7 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
   }
   comparison.inputs.noise = errors_of_inputs(arguments.input_noise, comparison.inputs.names);
   const report::TermsSummary summary = discovered(arguments, comparison, source);
-  const bool is_worse = summary.missing.answer == discovery::Answer::failed_held_out;
+  const bool is_worse = discovery::is_worse(summary.missing);
   if (!arguments.corrected.empty() && !is_worse) {
     write_corrected(arguments.corrected, {comparison.inputs.names, arguments.outputs, comparison.inputs.values,
                                           comparison.simulated, summary.missing.corrected, comparison.measured.values});

@@ -40,7 +40,7 @@ TOLERANCE = 0.25
 # Derivatives that equal an input or a term of it.
 SAME_INPUT = {"J_b": "dq", "J_b1": "dq1", "J_m": "ddq", "J_J": "ddq"}
 SAME_TERM = {"f1": "sign dq1"}
-INNER = ("delay", "lag", "drive_spring")
+INNER = ("delay", "lag", "drive_spring", "resonance")
 
 
 def arguments():

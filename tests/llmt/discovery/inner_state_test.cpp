@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
 #include "discovery/terms/derivatives.hpp"
+#include "discovery/terms/resonance.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 
@@ -107,6 +109,90 @@ TEST(InnerState, SpringInTheDriveIsMeasured) {
   EXPECT_EQ(missing.found.front().location, "q");
   constexpr double of_second_order = 0.15;
   EXPECT_NEAR(missing.found.front().coefficients(0) * rate, 1.0, of_second_order);
+}
+
+/// s - H s, by Runge's and Kutta's method in 40 steps a row.
+template <class Signal>
+Eigen::VectorXd integrated(const Eigen::VectorXd& instants, double omega, double zeta, const Signal& signal) {
+  const auto derivative = [&](double t, const Eigen::Vector2d& x) {
+    return Eigen::Vector2d(x(1), signal(t) - 2.0 * zeta * omega * x(1) - omega * omega * x(0));
+  };
+  constexpr int steps = 40;
+  Eigen::Vector2d x(signal(instants(0)) / (omega * omega), 0.0);
+  Eigen::VectorXd part(instants.size());
+  for (Eigen::Index i = 0; i < instants.size(); ++i) {
+    part(i) = derivative(instants(i), x)(1);
+    if (i + 1 == instants.size()) break;
+    const double h = (instants(i + 1) - instants(i)) / steps;
+    for (int k = 0; k < steps; ++k) {
+      const double t = instants(i) + k * h;
+      const Eigen::Vector2d a = derivative(t, x);
+      const Eigen::Vector2d b = derivative(t + 0.5 * h, x + 0.5 * h * a);
+      const Eigen::Vector2d c = derivative(t + 0.5 * h, x + 0.5 * h * b);
+      const Eigen::Vector2d d = derivative(t + h, x + h * c);
+      x += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+    }
+  }
+  return part;
+}
+
+// Straight lines between rows that are not equally spaced: the integral is exact but for that of the oracle.
+TEST(InnerState, ResonantPartIsThatOfAnIntegratedOscillator) {
+  Noise random(2);
+  constexpr Eigen::Index count = 200;
+  Eigen::VectorXd instants(count);
+  Eigen::VectorXd values(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    instants(i) = 0.02 * (static_cast<double>(i) + 0.6 * random.uniform());
+    values(i) = random.normal();
+  }
+  const auto between = [&](double t) {
+    const Eigen::Index above =
+        std::clamp<Eigen::Index>(std::ranges::upper_bound(instants, t) - instants.begin(), 1, count - 1);
+    const double share = (t - instants(above - 1)) / (instants(above) - instants(above - 1));
+    return values(above - 1) + share * (values(above) - values(above - 1));
+  };
+  Inputs inputs{{"t"}, instants};
+  inputs.instants = instants;
+  for (const double zeta : {0.02, 0.3, 0.9}) {
+    const double omega = 2.0 * std::numbers::pi * 4.0;
+    const Eigen::VectorXd expected = integrated(instants, omega, zeta, between);
+    EXPECT_LT((resonant_part(rows_of(inputs, values), 4.0, zeta) - expected).cwiseAbs().maxCoeff(), 1e-6);
+  }
+}
+
+TEST(InnerState, ResonantPartBeginsAtRestAfterALongInterruption) {
+  Inputs inputs{{"t"}, Eigen::VectorXd::LinSpaced(100, 0.0, 1.98)};
+  inputs.instants = inputs.values.col(0);
+  inputs.instants.tail(50).array() += 10.0;
+  const Eigen::VectorXd values = inputs.instants.array().square().matrix();
+  const Eigen::VectorXd part = resonant_part(rows_of(inputs, values), 2.0, 0.1);
+  EXPECT_EQ(part(0), 0.0);
+  EXPECT_NEAR(part(50), 0.0, 1e-12 * values(50));
+  EXPECT_GT(std::abs(part(60)), 1e-4);
+}
+
+// Dry friction makes a load of 60 % of the torque ring behind its spring at each reversal.
+TEST(InnerState, ResonanceIsMeasured) {
+  constexpr double share = 0.6;
+  constexpr double frequency = 6.0;
+  constexpr double zeta = 0.08;
+  const auto torque = [](double t) { return nominal(t) + (motion(t, 1, one) < 0.0 ? -8.0 : 8.0); };
+  for (const std::uint64_t seed : {1u, 2u}) {
+    Log log = log_of(seed, 0.2, torque);
+    for (Eigen::Index i = 0; i < rows; ++i) log.simulated(i, 0) = torque(log.inputs.instants(i));
+    const double omega = 2.0 * std::numbers::pi * frequency;
+    log.measured.values.col(0) -= share * integrated(log.inputs.instants, omega, zeta, torque);
+    const Missing missing = missing_from(log);
+    EXPECT_EQ(missing.answer, Answer::inner_state);
+    ASSERT_FALSE(missing.found.empty());
+    const FoundTerm& found = missing.found.front();
+    EXPECT_EQ(found.family, "resonance");
+    EXPECT_NEAR(found.coefficients(0), share, 0.1);
+    EXPECT_NEAR(found.constants(0), frequency, 0.1);
+    EXPECT_NEAR(found.constants(1), zeta, 0.02);
+    EXPECT_LT(missing.gaps.front().after, 0.4 * missing.gaps.front().before);
+  }
 }
 
 TEST(InnerState, DerivativesOfPolynomialsAreExact) {

@@ -42,15 +42,17 @@ TermFit fit_without(const TermModel& model, const TermData& kept, const TermFit&
 
 // Terms that change samples by C, a sum of squares in units of the variance of the noise, should shrink the sum of
 // squares there by C, with a standard deviation of 2 sqrt(C). Where only a share of the samples is independent, both
-// sums are of that share.
+// sums are of that share. What errors of the inputs add on average is taken off both. What they add by chance, with a
+// standard deviation of 2 sqrt(errors), does not say that a term is wrong.
 struct Judgement {
   double change = 0.0;
   double shrunk = 0.0;
+  double errors = 0.0;  // their part of C
 
   // Samples that terms hardly reach cannot judge them.
   bool is_possible() const { return change > 4.0; }
-  bool shrinks() const { return shrunk > 0.0; }
-  bool refutes() const { return !shrinks() && shrunk < change - 6.0 * std::sqrt(change); }
+  bool shrinks() const { return shrunk > -4.0 * std::sqrt(errors); }
+  bool refutes() const { return !shrinks() && shrunk < change - 6.0 * std::sqrt(std::max(0.0, change + errors)); }
 };
 
 // Rows of the samples that make up most of the growth of the error.
@@ -112,7 +114,7 @@ void judge_without_reversals(const TermModel& model, const TermData& kept, const
 }  // namespace
 
 void judge_held_out(const TermModel& model, const TermData& kept, const TermData& aside, const TermFit& baseline,
-                    const Settled& settled, Missing& missing) {
+                    const Settled& settled, const InputNoise* errors, Missing& missing) {
   if (aside.samples.size() == 0 || settled.fit.placed.empty()) return;
   const double variance = std::pow(settled.verdict.noise, 2.0);
   const double noise = variance / kept.independent_share;
@@ -122,17 +124,27 @@ void judge_held_out(const TermModel& model, const TermData& kept, const TermData
   const Eigen::VectorXd after = squared_errors(model, held_out, settled.fit);
   const Eigen::VectorXd change = scaled_residuals(model, held_out, baseline.parameters, baseline.placed) -
                                  scaled_residuals(model, held_out, settled.fit.parameters, settled.fit.placed);
-  const Judgement all{change.squaredNorm() / noise, (before.sum() - after.sum()) / noise};
-  if (all.is_possible() && !all.shrinks()) missing.failing_rows = rows_of_growth(held_out.samples, after - before);
   const Eigen::MatrixXd simulated = model.simulated(settled.fit.parameters);
+  // A state answers to errors of the inputs at its own frequency, many times over. Of other terms they are a small
+  // part.
+  const auto added_to = [&](std::vector<PlacedTerm> terms) {
+    std::erase_if(terms, [&](const PlacedTerm& own) { return model.terms()[own.term].inner_state.empty(); });
+    return errors != nullptr && !terms.empty() ? errors->added(held_out, terms, simulated)
+                                               : InputNoise::AddedByErrors{};
+  };
+  const auto judgement_of = [&](double changed, double shrunk, const InputNoise::AddedByErrors& added) {
+    return Judgement{(changed - added.change) / noise, (shrunk + added.left) / noise, added.change / noise};
+  };
+  const Judgement all = judgement_of(change.squaredNorm(), before.sum() - after.sum(), added_to(settled.fit.placed));
+  if (all.is_possible() && !all.shrinks()) missing.failing_rows = rows_of_growth(held_out.samples, after - before);
   for (std::size_t t = 0; t < settled.fit.placed.size(); ++t) {
     const PlacedTerm& placed = settled.fit.placed[t];
     const Eigen::VectorXd own = stacked_signature(model, held_out, placed, simulated) * placed.coefficients;
-    Judgement judgement{own.squaredNorm() / noise, 0.0};
+    const InputNoise::AddedByErrors added = added_to({placed});
     const bool in_time = !kept.stretches.empty();
-    if (!judgement.is_possible() && !in_time) continue;
+    if (!judgement_of(own.squaredNorm(), 0.0, added).is_possible() && !in_time) continue;
     const double without = squared_errors(model, held_out, fit_without(model, kept, settled.fit, t)).sum();
-    judgement.shrunk = (without - after.sum()) / noise;
+    const Judgement judgement = judgement_of(own.squaredNorm(), without - after.sum(), added);
     for (FoundTerm& found : missing.found) {
       const bool is_this = found.term == placed.term && found.output_index == placed.output &&
                            found.constants.size() == placed.constants.size() && found.constants == placed.constants;

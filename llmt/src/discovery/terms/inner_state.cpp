@@ -9,6 +9,7 @@
 
 #include "discovery/terms/derivatives.hpp"
 #include "discovery/terms/motion.hpp"
+#include "discovery/terms/resonance.hpp"
 #include "discovery/terms/surrogate.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "llmt/random.hpp"
@@ -50,6 +51,30 @@ ModelTerm delay(const std::shared_ptr<OfRows>& of_rows, const std::string& outpu
           .inner_state = "a delay or a first-order lag",
           .shown_by = "a signal measured behind the actuator, or a step of the command on the clock of the inputs",
           .unit = "s"};
+}
+
+ModelTerm resonance(const std::string& output, std::vector<double> frequencies) {
+  const auto constant = [](std::string name, std::string unit, std::vector<double> tried) {
+    return TermConstant{.name = std::move(name), .unit = std::move(unit), .tried = std::move(tried)};
+  };
+  return {.family = "resonance",
+          .location = "",
+          .formula =
+              "-share (simulated output - H simulated output), H = (2 z w p + w^2)/(p^2 + 2 z w p + w^2), "
+              "w = 2 pi frequency, z = damping ratio, p = d/dt",
+          .inputs = {},
+          .coefficients = {"share"},
+          .columns = [](const Rows& rows, const Eigen::VectorXd& constants) -> Eigen::MatrixXd {
+            constexpr double least = 1e-3;
+            constexpr double most = 0.2;  // more is a filter: it hardly rings
+            return -resonant_part(rows, std::max(constants(0), 1e-300), std::clamp(constants(1), least, most));
+          },
+          .constants = {constant("frequency", "Hz", std::move(frequencies)),
+                        constant("damping ratio", "1", {0.02, 0.04, 0.08, 0.16})},
+          .output = output,
+          .inner_state = "a resonance, as of a load behind a spring",
+          .shown_by = "an encoder or an accelerometer at the load",
+          .unit = "1"};
 }
 
 ModelTerm drive_spring(const std::shared_ptr<OfRows>& of_rows, const std::shared_ptr<const Surrogate>& surrogate,
@@ -134,12 +159,21 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
       constexpr double far = 10.0;  // times the output
       Rows here = rows;
       here.simulated = output;
-      const Eigen::MatrixXd columns = term.columns(here, {});
+      Eigen::VectorXd constants(std::ssize(term.constants));
+      for (std::size_t k = 0; k < term.constants.size(); ++k) constants(k) = term.constants[k].tried.front();
+      const Eigen::MatrixXd columns = term.columns(here, constants);
       term.lower = Eigen::VectorXd::Zero(columns.cols());
       term.upper = (far * output.norm() / columns.colwise().norm().array().max(1e-300)).matrix().transpose();
     };
     terms.push_back(delay(of_rows, outputs[o]));
     limit(terms.back());
+    Rows here = rows;
+    here.simulated = output;
+    if (std::vector<double> frequencies = resonant_frequencies(here); !frequencies.empty()) {
+      terms.push_back(resonance(outputs[o], std::move(frequencies)));
+      terms.back().lower = Eigen::VectorXd::Zero(1);
+      terms.back().upper = Eigen::VectorXd::Ones(1);
+    }
     if (surrogate->described()(o) < described) continue;
     // The spring's term holds the second derivative of the simulated output, which should not be noise.
     if (noise_of_second(of_rows->at(rows, inputs.values), rows, output) > largest_noise_share) continue;

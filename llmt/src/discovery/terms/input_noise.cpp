@@ -185,6 +185,24 @@ Eigen::VectorXd InputNoise::moment_correction(const TermData& data, const Placed
   return sum / static_cast<double>(draws_.size());
 }
 
+InputNoise::AddedByErrors InputNoise::added(const TermData& data, const std::vector<PlacedTerm>& placed,
+                                            const Eigen::MatrixXd& simulated) const {
+  const auto change_by = [&](const TermModel& model, const Eigen::MatrixXd& there) {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(data.measured.size());
+    for (const PlacedTerm& own : placed) sum += stacked_signature(model, data, own, there) * own.coefficients;
+    return sum;
+  };
+  const Eigen::VectorXd as_given = change_by(*model_, simulated);
+  AddedByErrors sum;
+  for (const std::shared_ptr<const Draw>& draw : draws_) {
+    const Eigen::VectorXd moved = change_by(*draw->model, simulated + draw->change) - as_given;
+    sum.change += moved.squaredNorm();
+    sum.left += moved.squaredNorm() + 2.0 * moved.dot(stacked(data, draw->change));
+  }
+  const auto draws = static_cast<double>(draws_.size());
+  return {sum.change / draws, sum.left / draws};
+}
+
 std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit) const {
   constexpr int steps = 2;
   std::vector<std::string> beyond;

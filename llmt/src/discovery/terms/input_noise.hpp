@@ -29,6 +29,16 @@ class InputNoise {
   Eigen::VectorXd moment_correction(const TermData& data, const PlacedTerm& placed,
                                     const Eigen::MatrixXd& simulated) const;
 
+  /// Of terms that change samples by c: what the errors add to its sum of squares, E |dc|^2, and to the error that the
+  /// terms leave, E |dc|^2 + 2 E dc' dy, where dy is the change of the simulation; in units of the scatter of each
+  /// output.
+  struct AddedByErrors {
+    double change = 0.0;
+    double left = 0.0;
+  };
+  AddedByErrors added(const TermData& data, const std::vector<PlacedTerm>& placed,
+                      const Eigen::MatrixXd& simulated) const;
+
   /// Estimates and standard errors of a fit corrected for the errors: steps (J'J - D)^-1 (J'r + g), D = E[dJ'dJ] and
   /// g = E[J'dy], where J is the Jacobian of the fit and dJ, dy are the changes of J and of the prediction that drawn
   /// errors make (Fuller 1987, section 3.1). Returns the names of parameters and terms that cannot be corrected,

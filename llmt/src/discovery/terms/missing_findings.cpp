@@ -185,6 +185,10 @@ void decide(Missing& missing, bool in_time) {
            std::abs(found.coefficients(0)) > certain * found.values.front().standard_error;
   };
   const bool has_inner_state = std::ranges::any_of(missing.found, is_state);
+  double share_of_state = 0.0;
+  for (const FoundTerm& found : missing.found) {
+    if (is_state(found)) share_of_state = std::max(share_of_state, found.share);
+  }
   if (has_inner_state) missing.answer = Answer::inner_state;
   if (!missing.failing_rows.empty()) missing.answer = Answer::failed_held_out;
   const std::vector<bool> approximate = approximations(missing.found, in_time);
@@ -196,9 +200,8 @@ void decide(Missing& missing, bool in_time) {
     found.confirmed = missing.answer != Answer::failed_held_out && missing.verdict.answer != Answer::unknown &&
                       !found.generic && !approximate[k] && !is_beside_structure && found.shrinks_gap &&
                       found.hangs_on.empty();
-    // What stands beside a state may be what the state does beyond the first order.
-    constexpr double small_share = 0.1;
-    if (has_inner_state && found.inner_state.empty() && found.share < small_share) found.confirmed = false;
+    // What stands beside a state, and explains less, may be what the state does beyond its model.
+    if (found.inner_state.empty() && found.share < share_of_state) found.confirmed = false;
     if (!found.inner_state.empty() && !is_state(found)) found.confirmed = false;
     if (!approximate[k] || !noted.insert(sorted_inputs(found)).second) continue;
     missing.notes.push_back(
@@ -210,6 +213,12 @@ void decide(Missing& missing, bool in_time) {
 void demand_certainty(Missing& missing) {
   const bool is_named = missing.answer == Answer::named || missing.answer == Answer::indistinguishable;
   if (is_named && !std::ranges::all_of(missing.found, &FoundTerm::confirmed)) missing.answer = Answer::unknown;
+}
+
+bool is_worse(const Missing& missing) {
+  double left = 0.0;
+  for (const Gap& gap : missing.gaps) left += gap.before > 0.0 ? std::pow(gap.after / gap.before, 2.0) : 1.0;
+  return missing.answer == Answer::failed_held_out || left > static_cast<double>(missing.gaps.size());
 }
 
 Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,

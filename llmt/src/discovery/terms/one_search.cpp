@@ -114,7 +114,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   if (errors.noise && !in_time) missing.structure.clear();
   TermData aside = data_of(split.held_out, measured);
   aside.sigma = data.sigma;
-  judge_held_out(model, kept, aside, baseline, settled, missing);
+  judge_held_out(model, kept, aside, baseline, settled, in_time ? errors.noise.get() : nullptr, missing);
   if (in_time) judge_in_time(model, kept, inputs, measured, settled, missing);
   missing.notes.insert(missing.notes.end(), errors.notes.begin(), errors.notes.end());
   decide(missing, in_time);
@@ -137,6 +137,13 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
                     .step = split.step,
                     .independent_share = data.independent_share,
                     .correlation_time = correlation_time(split, measured.values - missing.corrected)};
+  }
+  if (missing.answer != Answer::failed_held_out && is_worse(missing)) {
+    missing.notes.emplace_back(
+        missing.answer == Answer::inner_state
+            ? "with signals as noisy as these the correction is worse than none, and is not written: the terms make "
+              "errors of the inputs larger, by more than they explain on the rows set aside"
+            : "the correction makes the error on the rows set aside larger, and is not written");
   }
   work.finish();
   return missing;

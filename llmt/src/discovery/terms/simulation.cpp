@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "discovery/terms/alternatives.hpp"
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/determined.hpp"
 #include "discovery/terms/motion.hpp"
@@ -124,57 +125,17 @@ std::vector<std::string> notes_on_reversals(const std::vector<Reversals>& revers
   return notes;
 }
 
-// Sum over the outputs of the squared errors on the samples set aside, in units of those before.
-double left_on_held_out(const Missing& missing) {
-  double left = 0.0;
-  for (const Gap& gap : missing.gaps) left += gap.before > 0.0 ? std::pow(gap.after / gap.before, 2.0) : 0.0;
-  return left;
-}
-
-// Shapes follow noise that is alike in neighbours farther than causes do, and they follow what is small beside the
-// causes. Where causes alone leave as little on the rows set aside, they are the answer.
-Missing causes_for_shapes(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                          const std::vector<ModelTerm>& terms, const SearchedRows& rows, const MissingOptions& options,
-                          std::set<std::size_t> refuted, Missing with_shapes) {
-  const bool has_shapes = std::ranges::any_of(with_shapes.found, &FoundTerm::generic);
-  if (inputs.instants.size() == 0 || !has_shapes || with_shapes.held_out.empty()) return with_shapes;
-  for (std::size_t t = 0; t < terms.size(); ++t) {
-    if (terms[t].generic) refuted.insert(t);
-  }
-  Missing of_causes = search_once(simulation, inputs, measured, terms, rows, options, refuted);
-  constexpr double as_little = 1.1;
-  constexpr double immaterial = 0.01;
-  const double left = left_on_held_out(with_shapes);
-  const bool is_as_good = of_causes.answer != Answer::failed_held_out && !of_causes.found.empty() &&
-                          left_on_held_out(of_causes) <= std::max(as_little * left, left + immaterial);
-  return is_as_good ? of_causes : with_shapes;
-}
-
-// What a term with a constant misses makes neighbours alike, so that few samples count and two plain terms in its place
-// do not seem to be worth their cost. Where terms without constants leave clearly less on the rows set aside, they are
-// the answer.
-Missing plain_for_searched(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                           const std::vector<ModelTerm>& terms, const SearchedRows& rows, const MissingOptions& options,
-                           const std::set<std::size_t>& refuted, Missing found) {
-  if (inputs.instants.size() == 0 || found.held_out.empty() || found.answer == Answer::inner_state) return found;
-  std::set<std::vector<std::string>> places;
-  for (const FoundTerm& term : found.found) {
-    if (!term.generic && term.constants.size() > 0 && term.inputs.size() == 1) places.insert(term.inputs);
-  }
-  for (const std::vector<std::string>& place : places) {
-    std::set<std::size_t> without = refuted;
-    for (std::size_t t = 0; t < terms.size(); ++t) {
-      if (terms[t].inputs == place && !terms[t].constants.empty()) without.insert(t);
-    }
-    Missing plain = search_once(simulation, inputs, measured, terms, rows, options, without);
-    constexpr double clearly_less = 0.8;
-    const auto holds = [](const FoundTerm& term) { return term.confirmed && !term.generic; };
-    if (!plain.found.empty() && std::ranges::all_of(plain.found, holds) &&
-        left_on_held_out(plain) < clearly_less * left_on_held_out(found)) {
-      found = std::move(plain);
+// Terms of a state that were found with a constant beyond all that were tried.
+std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms) {
+  std::set<std::size_t> beyond;
+  for (const FoundTerm& found : missing.found) {
+    const ModelTerm& term = terms[found.term];
+    for (Eigen::Index k = 0; k < found.constants.size() && !term.inner_state.empty(); ++k) {
+      const std::vector<double>& tried = term.constants[static_cast<std::size_t>(k)].tried;
+      if (found.constants(k) < tried.front() || found.constants(k) > tried.back()) beyond.insert(found.term);
     }
   }
-  return found;
+  return beyond;
 }
 
 // Searches until what is found holds on the rows set aside. Terms that are refuted there are no candidates of the next
@@ -182,25 +143,28 @@ Missing plain_for_searched(const Simulation& simulation, const Inputs& inputs, c
 // term must shrink the gap on the rows set aside, of one search or the next.
 Missing find_at(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                 const std::vector<ModelTerm>& terms, const SearchedRows& rows, MissingOptions options,
-                Missing missing) {
+                std::set<std::size_t> refuted, Missing missing) {
   const bool in_time = inputs.instants.size() > 0;
   const int most = in_time ? 4 : 3;
-  std::set<std::size_t> refuted;
   std::set<std::size_t> unproven;
   std::vector<std::string> notes;
   for (int trial = 1;; ++trial) {
     if (trial > 1) missing = search_once(simulation, inputs, measured, terms, rows, options, refuted);
+    const std::set<std::size_t> beyond = beyond_constants(missing, terms);
     const auto is_unproven = [&](const FoundTerm& found) { return in_time && !found.shrinks_gap; };
     const bool holds =
         missing.answer != Answer::failed_held_out && std::ranges::none_of(missing.found, [&](const FoundTerm& found) {
-          return !found.hangs_on.empty() || is_unproven(found);
+          return !found.hangs_on.empty() || is_unproven(found) || beyond.contains(found.term);
         });
     if (holds || trial == most) {
-      missing = causes_for_shapes(simulation, inputs, measured, terms, rows, options, refuted, std::move(missing));
-      missing = plain_for_searched(simulation, inputs, measured, terms, rows, options, refuted, std::move(missing));
+      const Alternatives alternatives{simulation, inputs, measured, terms, rows, options, refuted};
+      missing = alternatives.state_for_terms(std::move(missing));
+      missing = alternatives.causes_for_shapes(std::move(missing));
+      missing = alternatives.plain_for_searched(std::move(missing));
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
       return missing;
     }
+    refuted.insert(beyond.begin(), beyond.end());
     for (const FoundTerm& found : missing.found) {
       const bool fails_again = is_unproven(found) && !unproven.insert(found.term).second;
       if (!found.is_refuted && !fails_again && found.hangs_on.empty()) continue;
@@ -221,6 +185,55 @@ Missing find_at(const Simulation& simulation, const Inputs& inputs, const Measur
   }
 }
 
+// Whether a state that rings after reversals explains more than any other term.
+bool resonance_comes_first(const Missing& missing, const std::vector<ModelTerm>& terms) {
+  double of_resonance = 0.0;
+  double of_others = 0.0;
+  for (const FoundTerm& found : missing.found) {
+    const ModelTerm& term = terms[found.term];
+    const bool rings = !term.inner_state.empty() && !term.constants.empty();
+    double& largest = rings ? of_resonance : of_others;
+    largest = std::max(largest, found.share);
+  }
+  return of_resonance > of_others;
+}
+
+// What find_at() begins with.
+struct Beginning {
+  SearchedRows rows;
+  Missing missing;
+  std::vector<std::string> at_reversals;  // notes
+};
+
+// Chooses the rows: averaged or not, with reversals or without. Ends where a state has constants beyond those tried.
+Beginning begin(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                const std::vector<ModelTerm>& terms, SearchedRows rows, const MissingOptions& options,
+                const std::set<std::size_t>& refuted) {
+  Beginning now{std::move(rows), {}, {}};
+  const auto search = [&] {
+    now.missing = search_once(simulation, inputs, measured, terms, now.rows, options, refuted);
+  };
+  const auto is_beyond = [&] { return !beyond_constants(now.missing, terms).empty(); };
+  search();
+  if (inputs.instants.size() == 0 || is_beyond()) return now;
+  // What is left is alike in neighbours: single rows say little more than their means, which hold less noise. A state
+  // is of single rows, and rings after reversals.
+  constexpr double alike = 0.5;  // independent share
+  constexpr Eigen::Index fewest_of_alike = 80;
+  if (!resonance_comes_first(now.missing, terms) && now.missing.time.independent_share < alike) {
+    now.rows.fewest_samples = fewest_of_alike;
+    search();
+  }
+  constexpr int most = 3;
+  for (int k = 0; k < most && !is_beyond() && !resonance_comes_first(now.missing, terms); ++k) {
+    const std::vector<Reversals> reversals = left_at_reversals(inputs, measured, now.missing, now.rows.apart);
+    if (reversals.empty()) break;
+    search();
+    now.at_reversals = notes_on_reversals(reversals);
+  }
+  return now;
+}
+
 // The search sees inputs without most of their errors. The answer is of the rows as they were given.
 Missing find(const Simulation& simulation, const Inputs& as_given, const MeasuredOutputs& measured,
              const std::vector<ModelTerm>& terms, MissingOptions options) {
@@ -236,23 +249,16 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   const Inputs inputs = with_zero_bands(there, smooth.inputs, measured);
   SearchedRows rows{rows_at_rest(inputs)};
   for (std::size_t i = 0; i < rows.apart.size(); ++i) rows.apart[i] = rows.apart[i] || smooth.unknown_sign[i];
-  Missing missing = search_once(there, inputs, measured, terms, rows, options, {});
-  // What is left is alike in neighbours: single rows say little more than their means, which hold less noise.
-  constexpr double alike = 0.5;  // independent share
-  constexpr Eigen::Index fewest_of_alike = 80;
-  if (missing.time.in_time && missing.time.independent_share < alike) {
-    rows.fewest_samples = fewest_of_alike;
-    missing = search_once(there, inputs, measured, terms, rows, options, {});
+  std::set<std::size_t> refuted;
+  Beginning beginning = begin(there, inputs, measured, terms, rows, options, refuted);
+  // The filter of a recording looks like a state whose constants are not those of a machine.
+  for (auto beyond = beyond_constants(beginning.missing, terms); !beyond.empty();
+       beyond = beyond_constants(beginning.missing, terms)) {
+    refuted.insert(beyond.begin(), beyond.end());
+    beginning = begin(there, inputs, measured, terms, rows, options, refuted);
   }
-  std::vector<std::string> at_reversals;
-  constexpr int most = 3;
-  for (int k = 0; k < most && inputs.instants.size() > 0; ++k) {
-    const std::vector<Reversals> reversals = left_at_reversals(inputs, measured, missing, rows.apart);
-    if (reversals.empty()) break;
-    missing = search_once(there, inputs, measured, terms, rows, options, {});
-    at_reversals = notes_on_reversals(reversals);
-  }
-  missing = find_at(there, inputs, measured, terms, rows, options, std::move(missing));
+  Missing missing =
+      find_at(there, inputs, measured, terms, beginning.rows, options, refuted, std::move(beginning.missing));
   missing.zero_bands = inputs.zero_bands;
   if (is_smoothed) {
     missing.before -= smooth.change;
@@ -261,7 +267,7 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   }
   const std::vector<std::string> at_rest = notes_on_rest(inputs);
   missing.notes.insert(missing.notes.begin(), at_rest.begin(), at_rest.end());
-  missing.notes.insert(missing.notes.begin(), at_reversals.begin(), at_reversals.end());
+  missing.notes.insert(missing.notes.begin(), beginning.at_reversals.begin(), beginning.at_reversals.end());
   missing.notes.insert(missing.notes.begin(), smooth.notes.begin(), smooth.notes.end());
   return missing;
 }

@@ -1,0 +1,68 @@
+#include "discovery/terms/alternatives.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace llmt::discovery {
+namespace {
+
+constexpr double clearly_less = 0.8;
+
+// Sum over the outputs of the squared errors on the samples set aside, in units of those before.
+double left_on_held_out(const Missing& missing) {
+  double left = 0.0;
+  for (const Gap& gap : missing.gaps) left += gap.before > 0.0 ? std::pow(gap.after / gap.before, 2.0) : 0.0;
+  return left;
+}
+
+}  // namespace
+
+Missing Alternatives::without(std::set<std::size_t> refuted,
+                              const std::function<bool(const ModelTerm&)>& left_out) const {
+  for (std::size_t t = 0; t < terms_->size(); ++t) {
+    if (left_out((*terms_)[t])) refuted.insert(t);
+  }
+  return search_once(*simulation_, *inputs_, *measured_, *terms_, *rows_, *options_, refuted);
+}
+
+Missing Alternatives::state_for_terms(Missing found) const {
+  const auto is_state = [&](std::size_t t) { return !(*terms_)[t].inner_state.empty(); };
+  if (!has_judges(found) || std::ranges::none_of(*refuted_, is_state) || found.answer == Answer::inner_state) {
+    return found;
+  }
+  Missing of_state = without({}, [](const ModelTerm& term) { return term.inner_state.empty(); });
+  const bool is_better = of_state.answer == Answer::inner_state && left_on_held_out(of_state) < left_on_held_out(found);
+  return is_better ? of_state : found;
+}
+
+Missing Alternatives::causes_for_shapes(Missing found) const {
+  if (!has_judges(found) || std::ranges::none_of(found.found, &FoundTerm::generic)) return found;
+  Missing of_causes = without(*refuted_, [](const ModelTerm& term) { return term.generic; });
+  constexpr double as_little = 1.1;
+  constexpr double immaterial = 0.01;
+  const double left = left_on_held_out(found);
+  const bool is_as_good = of_causes.answer != Answer::failed_held_out && !of_causes.found.empty() &&
+                          left_on_held_out(of_causes) <= std::max(as_little * left, left + immaterial);
+  return is_as_good ? of_causes : found;
+}
+
+Missing Alternatives::plain_for_searched(Missing found) const {
+  if (!has_judges(found) || found.answer == Answer::inner_state) return found;
+  std::set<std::vector<std::string>> places;
+  for (const FoundTerm& term : found.found) {
+    if (!term.generic && term.constants.size() > 0 && term.inputs.size() == 1) places.insert(term.inputs);
+  }
+  for (const std::vector<std::string>& place : places) {
+    Missing plain =
+        without(*refuted_, [&](const ModelTerm& term) { return term.inputs == place && !term.constants.empty(); });
+    const auto holds = [](const FoundTerm& term) { return term.confirmed && !term.generic; };
+    if (!plain.found.empty() && std::ranges::all_of(plain.found, holds) &&
+        left_on_held_out(plain) < clearly_less * left_on_held_out(found)) {
+      found = std::move(plain);
+    }
+  }
+  return found;
+}
+
+}  // namespace llmt::discovery

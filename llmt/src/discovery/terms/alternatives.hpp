@@ -1,0 +1,53 @@
+// Searches among fewer terms, whose answer is taken where it does better on the rows set aside.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <set>
+#include <vector>
+
+#include "discovery/terms/one_search.hpp"
+
+namespace llmt::discovery {
+
+/// Of one question, for rows in time. Each search returns what was found where it does no better.
+class Alternatives {
+ public:
+  /// Keeps references.
+  Alternatives(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+               const std::vector<ModelTerm>& terms, const SearchedRows& rows, const MissingOptions& options,
+               const std::set<std::size_t>& refuted)
+      : simulation_(&simulation),
+        inputs_(&inputs),
+        measured_(&measured),
+        terms_(&terms),
+        rows_(&rows),
+        options_(&options),
+        refuted_(&refuted) {}
+
+  /// A state and terms of the row itself explain a part of each other. Where a term of a state was refuted beside
+  /// others, and such terms alone leave clearly less than what was found without them, they are the answer.
+  Missing state_for_terms(Missing found) const;
+
+  /// Shapes follow noise that is alike in neighbours farther than causes do, and they follow what is small beside the
+  /// causes. Where causes alone leave as little, they are the answer.
+  Missing causes_for_shapes(Missing found) const;
+
+  /// What a term with a constant misses makes neighbours alike, so that few samples count and two plain terms in its
+  /// place do not seem to be worth their cost. Where terms without constants leave clearly less, they are the answer.
+  Missing plain_for_searched(Missing found) const;
+
+ private:
+  const Simulation* simulation_;
+  const Inputs* inputs_;
+  const MeasuredOutputs* measured_;
+  const std::vector<ModelTerm>* terms_;
+  const SearchedRows* rows_;
+  const MissingOptions* options_;
+  const std::set<std::size_t>* refuted_;
+
+  bool has_judges(const Missing& found) const { return inputs_->instants.size() > 0 && !found.held_out.empty(); }
+  Missing without(std::set<std::size_t> refuted, const std::function<bool(const ModelTerm&)>& left_out) const;
+};
+
+}  // namespace llmt::discovery

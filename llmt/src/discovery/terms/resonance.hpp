@@ -1,0 +1,21 @@
+// The part of a signal that a spring in its way takes off or adds.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "llmt/discovery/model_term.hpp"
+
+namespace llmt::discovery {
+
+/// At the rows in time, s - H s of the simulated output s, where H(p) = (2 zeta w p + w^2) / (p^2 + 2 zeta w p + w^2),
+/// p = d/dt, w = 2 pi frequency, is how a load behind a spring and damper follows: from rest at the beginning of a
+/// recording, exact for a signal that is a straight line between rows. An interruption of up to one period, as where
+/// rows were left out, is bridged by such a line. 0 < damping < 1.
+Eigen::VectorXd resonant_part(const Rows& rows, double frequency, double damping);
+
+/// Frequencies (per unit of the instants) that may be told from the motion: from that of a sine which changes as fast
+/// as the simulated output to one third of a sample each; at most 40. Empty: there is none.
+std::vector<double> resonant_frequencies(const Rows& rows);
+
+}  // namespace llmt::discovery
