@@ -9,17 +9,19 @@ from pathlib import Path
 import numpy as np
 
 import llmt
-from llmt import robotics
+from llmt import robotics, samples
 
 inputs = np.random.default_rng(0).uniform(-1, 1, (500, 2))
 outputs = np.where(inputs[:, 0] > 0, 3 * inputs[:, 1], 1.0)
 model = llmt.LocalLinearTreeRegressor().fit(inputs, outputs)
 assert np.allclose(model.predict([[0.5, 0.5], [-0.5, 0.5]]), [1.5, 1.0], atol=0.01)
 
-samples = Path(__file__).resolve().parents[2] / "docs" / "samples"
+X, y = samples.heat_pump()  # arrays with words: no pandas here
+assert llmt.LocalLinearTreeRegressor(cv=0).fit(X, y).score(X, y) > 0.9
+
 for description in ("arm.yaml", "arm.urdf"):
-    calibrated = robotics.calibrate(samples / description, samples / "arm_measured.csv", folds=0)
-    errors = {row["model"]: row["mean"] for row in calibrated.errors}  # no pandas here
+    calibrated = robotics.calibrate(samples.path(description), samples.arm_measured(), folds=0)
+    errors = {row["model"]: row["mean"] for row in calibrated.errors}
     assert errors["geometric"] < 0.5 * errors["nominal"], errors
 
 loaded = {line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if ".so" in line}

@@ -101,7 +101,7 @@ class PrintedRules {
     return words;
   }
 
-  // "if 3 < a <= 21 and colour in {red, blue}", "everywhere".
+  // "if 3 < a <= 21 and colour in {red, blue} and town = Brno", "everywhere".
   static bool holds(const std::string& condition, const Row& row) {
     if (condition == "everywhere") return true;
     EXPECT_TRUE(condition.starts_with("if ")) << condition;
@@ -113,6 +113,10 @@ class PrintedRules {
       if (const std::size_t in = part.find(" in {"); in != std::string::npos) {
         const std::string levels = ", " + part.substr(in + 5, part.size() - in - 6) + ", ";
         if (levels.find(", " + row.words.at(part.substr(0, in)) + ", ") == std::string::npos) return false;
+        continue;
+      }
+      if (const std::size_t is = part.find(" = "); is != std::string::npos) {
+        if (row.words.at(part.substr(0, is)) != part.substr(is + 3)) return false;
         continue;
       }
       const std::vector<std::string> words = words_of(part);

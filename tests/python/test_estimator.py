@@ -15,7 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from llmt import LocalLinearTreeRegressor, Model
+from llmt import LocalLinearTreeRegressor, Model, _core
 
 PROGRAM = os.environ.get("LLMT_PROGRAM", "")
 
@@ -212,6 +212,17 @@ def test_ctrl_c_ends_a_fit(after):
     output, _ = child.communicate(timeout=60)
     print(f"interrupted after {time.monotonic() - sent:.2f} s")
     assert output == "interrupted 0\n"
+
+
+@pytest.mark.parametrize(
+    ("call", "rows"), [("predict", 30000), ("extrapolation", 30000), ("intervals", 3000), ("attribute", 15)]
+)
+def test_calls_of_many_rows_look_for_ctrl_c_between_blocks(call, rows):
+    X, y = stepped(300)
+    handle = LocalLinearTreeRegressor().fit(X, y).model_.handle
+    before = _core.looks_for_signals()
+    getattr(handle, call)(np.resize(X, (rows, X.shape[1])), *([0.9] if call == "intervals" else []))
+    assert _core.looks_for_signals() - before == 3
 
 
 def test_nothing_is_printed_and_no_file_is_written(tmp_path, capfd, monkeypatch):

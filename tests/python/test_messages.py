@@ -124,6 +124,38 @@ def test_a_printed_readable_tree_has_its_equations(readable):
         assert equation in text
 
 
+def test_a_drawn_readable_tree_has_its_equations_and_thresholds(readable):
+    pytest.importorskip("matplotlib").use("agg")
+    axes = readable.plot()
+    drawn = " ".join(text.get_text() for text in axes.texts).replace("\N{MINUS SIGN}", "-")
+    page = readable._repr_html_().replace("\N{MINUS SIGN}", "-")
+    for shown in (" ".join(drawn.split()), page):
+        for equation in readable.rules_["then"]:
+            assert all(term in shown for term in re.split(" (?=[+-] )", equation.partition(" = ")[2])), equation
+        assert "rounded" not in shown
+    for node in readable.model_.to_dict()["partitions"][0]["nodes"]:
+        if "split" in node:
+            assert str(node["split"]["threshold"]).removesuffix(".0") in drawn
+
+
+def test_a_drawing_that_rounds_says_so(table):
+    pytest.importorskip("matplotlib").use("agg")
+    model = LocalLinearTreeRegressor(validity="crisp", max_leaves=3).fit(*table)
+    assert any("rounded" in text.get_text() for text in model.plot().texts)
+    assert "rounded" in model._repr_html_() and "rounded" in str(model)
+
+
+def test_one_category_is_named_alike_everywhere():
+    rng = np.random.default_rng(1)
+    town = np.array(["Brno", "Plzen", "Prague"])[rng.integers(0, 3, 400)]
+    X = pandas.DataFrame({"x": rng.uniform(0, 1, 400), "town": town})
+    y = np.where(town == "Prague", 5.0 * X["x"], 20.0 - X["x"]) + 0.1 * rng.normal(size=400)
+    model = LocalLinearTreeRegressor(validity="crisp", max_leaves=2).fit(X, y)
+    for words in (*model.rules_["if"], *model.leaves_["where"]):
+        assert words in ("town = Prague", "town in {Brno, Plzen}")
+        assert words in str(model)
+
+
 def test_the_cost_of_reading_is_printed(table, readable):
     assert "Reading costs 11 % more error; a smaller share, such as readable=0.05, costs less." in " ".join(str(readable).split())
     assert "Reading costs" not in str(LocalLinearTreeRegressor(validity="crisp").fit(*table))
@@ -156,6 +188,7 @@ def test_dir_has_the_public_names_once():
 
 robotics = pytest.importorskip("llmt.robotics")
 JOINTS = [f"q{k}_rad" for k in range(1, 7)]
+POINT = ["x_mm", "y_mm", "z_mm"]
 
 
 @pytest.fixture(scope="module")
@@ -180,16 +213,24 @@ def in_metres(arm):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda arm, of: (arm, of.assign(**np.degrees(of[JOINTS]))), "look like degrees; rename q1_rad to q1_deg"),
-        (lambda arm, of: (arm, of.assign(**{n: of[n] / 1e3 for n in ("x_mm", "y_mm", "z_mm")})), "rename them to x_m"),
-        (lambda arm, of: (in_metres(arm), of), "the lengths of the description look like metres"),
-        (lambda arm, of: (arm, of.rename(columns={"y_mm": "Y_mm"})), 'column "Y_mm": did you mean "y_mm"'),
+        (lambda arm, of: (arm, of.assign(**np.degrees(of[JOINTS]))), "the angles of the file are degrees, not radians"),
+        (lambda arm, of: (arm, of.assign(**{n: of[n] / 1e3 for n in POINT})), "the measured positions are metres"),
+        (lambda arm, of: (arm, of.assign(q2_rad=-of["q2_rad"])), "joint2 counts in the other direction"),
+        (lambda arm, of: (arm, of.assign(q2_rad=of["q3_rad"], q3_rad=of["q2_rad"])), "joint2 and joint3 are exchanged"),
+        (lambda arm, of: (in_metres(arm), of), "the lengths of the description are metres, not millimetres"),
     ],
 )
-def test_likely_causes_are_named(arm, measured, change, words):
+@pytest.mark.parametrize("task", ["calibrate", "discover"])
+def test_likely_causes_are_named(arm, measured, change, words, task):
     robot, table = change(arm, measured)
-    with pytest.raises(ValueError, match=re.escape(words)):
-        robotics.calibrate(robot, table, folds=0)
+    options = {"folds": 0} if task == "calibrate" else {}
+    with pytest.raises(ValueError, match=rf"\n- most likely .*{re.escape(words)}"):
+        getattr(robotics, task)(robot, table, **options)
+
+
+def test_a_name_in_the_wrong_case_is_an_error(arm, measured):
+    with pytest.raises(ValueError, match='column "Y_mm": did you mean "y_mm"'):
+        robotics.calibrate(arm, measured.rename(columns={"y_mm": "Y_mm"}))
 
 
 def test_a_missing_coordinate_is_warned_of(arm, measured):

@@ -223,6 +223,19 @@ def test_results_are_plain_and_have_pictures(found, calibrated):
     assert len(calibrated.poses) == 150
 
 
+def test_points_set_aside_are_those_of_the_gap(found):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    gap = found.gap
+    aside = found.poses[found.poses["set_aside"]]
+    assert len(found.poses) == 150 and len(aside) == gap["heldout_poses"] == 30
+    assert aside["before_mm"].mean() == pytest.approx(gap["before_mm"], abs=1e-9)
+    assert aside["after_mm"].mean() == pytest.approx(gap["after_mm"], abs=1e-9)
+    lines = {line.get_label(): line for line in found.plot().lines}
+    assert (lines[f"after, set aside, mean {gap['after_mm']:.4f} mm"].get_xdata() == aside.index).all()
+    assert len(lines["after, searched"].get_xdata()) == 120
+
+
 def changed(frame, column, row, value):
     copy = frame.astype({column: object})
     copy.loc[row, column] = value

@@ -101,8 +101,9 @@ class Fit {
     const bool has_folds = result_->summary.partitions.front().cv_folds > 0;
     std::optional<ReadableResult> shown = readable_;
     if (!shown && has_folds && why_not_readable(options_).empty()) {
-      const nb::gil_scoped_release unlocked;
-      shown = fit_readable(*prepared_, result_->summary);
+      interruptible(
+          [&](const Progress& progress) { shown = fit_readable(*prepared_, result_->summary, loss_, progress); },
+          nb::none());
     }
     const TrainingData& rows = prepared_->data();
     return report::filled_page(report::empty_page(),

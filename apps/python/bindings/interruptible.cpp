@@ -14,6 +14,8 @@ namespace {
 
 constexpr auto between_looks = std::chrono::milliseconds(50);
 
+long looks = 0;  // for signals; under the interpreter's lock
+
 struct Shared {
   std::mutex mutex;
   std::condition_variable ended;
@@ -43,8 +45,11 @@ void run(const std::function<void(const Progress&)>& work, Shared& shared) {
 }  // namespace
 
 void check_signals() {
+  ++looks;
   if (PyErr_CheckSignals() != 0) throw nb::python_error();
 }
+
+long looks_for_signals() { return looks; }
 
 void interruptible(const std::function<void(const Progress&)>& work, const nb::object& report) {
   Shared shared;

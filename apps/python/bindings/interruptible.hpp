@@ -21,4 +21,7 @@ void interruptible(const std::function<void(const Progress&)>& work, const nb::o
 /// Raises what the handlers of pending signals raise.
 void check_signals();
 
+/// How often check_signals() was called.
+long looks_for_signals();
+
 }  // namespace llmt::python

@@ -5,12 +5,15 @@
 #include "llmt/files.hpp"
 #include "llmt/options.hpp"
 #include "python/bindings/errors.hpp"
+#include "python/bindings/interruptible.hpp"
 
 NB_MODULE(_core, module) {
   module.doc() = "The C++ library, bound. The classes of the package llmt are what people use.";
   module.attr("__version__") = LLMT_VERSION;
   module.attr("most_categories") = llmt::most_categories;
   llmt::python::register_errors();
+  module.def("looks_for_signals", &llmt::python::looks_for_signals,
+             "How often long calls have looked whether Ctrl-C was pressed.");
   module.def(
       "write_file",
       [](const nanobind::bytes& path, const std::string& content) {

@@ -10,9 +10,9 @@
 
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/robot_c_source.hpp"
-#include "python/bindings/errors.hpp"
 #include "python/bindings/interruptible.hpp"
 #include "python/bindings/module.hpp"
+#include "python/bindings/outcome.hpp"
 #include "python/bindings/robots.hpp"
 #include "report/document/page.hpp"
 #include "report/robot/arm_tables.hpp"
@@ -29,25 +29,6 @@
 
 namespace llmt::python {
 namespace {
-
-// What a task has to say, and its result: `json`, `text`, `warnings` and more.
-class Outcome {
- public:
-  report::Warn warn() {
-    return [this](const std::string& sentence) { warnings_.push_back(in_words_of_python(sentence)); };
-  }
-
-  nb::dict dict(const std::string& text, const report::Json& json) const {
-    nb::dict result;
-    result["text"] = in_words_of_python(text);
-    result["json"] = json.dump(-1, ' ', false, report::Json::error_handler_t::replace);
-    result["warnings"] = warnings_;
-    return result;
-  }
-
- private:
-  std::vector<std::string> warnings_;
-};
 
 std::vector<double> numbers_of(const Eigen::VectorXd& values) { return {values.begin(), values.end()}; }
 
@@ -106,7 +87,7 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
                                       test_reader(test, {}, reading), task);
       },
       report);
-  if (run->is_implausible) throw std::runtime_error(run->refusal);
+  if (run->is_implausible) throw refused(run->refusal, run->input_mistakes);
   Outcome outcome;
   if (!run->refusal.empty()) outcome.warn()(run->refusal);
   const report::CalibrationFacts facts = run->facts("");
@@ -132,6 +113,16 @@ std::vector<robotics::EffectType> catalogue_of(const std::optional<Source>& sour
                         : robotics::read_catalogue(source->first);
 }
 
+// Of each measured point whether it was set aside; all were where they are those of a test.
+std::vector<bool> are_set_aside(const report::DiscoveryRun& run) {
+  if (run.has_test) return {};
+  std::vector<bool> rows(run.measurements.count());
+  for (const Eigen::Index row : run.found.held_out.rows) rows[row] = true;
+  std::vector<bool> points;
+  for (const Eigen::Index row : robotics::position_rows(run.measurements.poses)) points.push_back(rows[row]);
+  return points;
+}
+
 nb::dict discover(const Arm& arm, const Source& measured, const std::optional<Source>& test, const Reading& reading,
                   double held_out, int folds, bool contiguous, const std::optional<Source>& catalogue,
                   double mass_uncertainty, std::uint64_t seed, bool page, const nb::object& report) {
@@ -144,22 +135,26 @@ nb::dict discover(const Arm& arm, const Source& measured, const std::optional<So
   Outcome outcome;
   std::optional<report::DiscoveryRun> run;
   std::optional<robotics::Measurements> judged;  // by the picture of the errors
-  interruptible(
-      [&](const Progress& progress) {
-        task.options.progress = progress;
-        const std::vector<std::string> also = report::searched_columns(task.options.catalogue, arm.robot.robot);
-        const ReadTest read_test = test_reader(test, also, reading);
-        run = report::run_discovery(arm.robot.robot, measurements_of(measured, arm.robot.robot, also, reading),
-                                    read_test, task, outcome.warn());
-        judged = report::points_of(read_test ? read_test(run->robot) : run->measurements);
-      },
-      report);
+  const auto work = [&](const Progress& progress) {
+    task.options.progress = progress;
+    const std::vector<std::string> also = report::searched_columns(task.options.catalogue, arm.robot.robot);
+    const ReadTest read_test = test_reader(test, also, reading);
+    run = report::run_discovery(arm.robot.robot, measurements_of(measured, arm.robot.robot, also, reading), read_test,
+                                task, outcome.warn());
+    judged = report::points_of(read_test ? read_test(run->robot) : run->measurements);
+  };
+  try {
+    interruptible(work, report);
+  } catch (const std::runtime_error& error) {
+    throw refused(error.what(), outcome.warnings());
+  }
   nb::dict result = outcome.dict(report::discovery_text(*run, measured.first), report::discovery_run_json(*run));
   result["robot"] = made_from(arm, run->found.improved);
   nb::dict errors;
   errors["before"] = numbers_of(robotics::distances(robotics::positions(run->found.before, judged->poses), *judged));
   errors["after"] = numbers_of(robotics::distances(robotics::positions(run->found.improved, judged->poses), *judged));
   result["errors"] = errors;
+  result["set_aside"] = are_set_aside(*run);
   result["page"] = page_of(page, [&] {
     return report::discovery_report(
         {arm.name, measured.first, report::points_of(run->measurements), run->found, run->next});

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ._facts import Facts, facts_of
-from ._layout import CUT_NOTE, LINE, MOST_LEAVES, Item, Layout, layout_of
+from ._layout import LINE, MOST_LEAVES, Item, Layout, layout_of
 from ._tree import Tree, decimal, number, shown, trees
 
 WIDTH = 900.0  # px
@@ -46,8 +46,8 @@ def tree_html(
     for position, tree in enumerate(drawn):
         facts = facts_of(model, tree, summary, position, coverage, mean, readable)
         layout = layout_of(tree, WIDTH / _EM, most_leaves)
-        note = f'<div style="opacity:.8">{CUT_NOTE}</div>' if layout.is_cut else ""
-        parts.append(_head(tree, facts, summary) + _bars(facts) + _svg(tree, layout) + note)
+        notes = f'<div style="opacity:.8">{" ".join(layout.notes)}</div>' if layout.notes else ""
+        parts.append(_head(tree, facts, summary) + _bars(facts) + _svg(tree, layout) + notes)
     if len(of_partitions) > len(drawn):
         parts.append(
             f"<div>\N{HORIZONTAL ELLIPSIS} and the trees of {len(of_partitions) - len(drawn)} further targets</div>"

@@ -15,6 +15,7 @@ MOST_LEAVES = 32
 MOST_DEPTH = 9
 LINE = 1.25  # height of a line of text
 GAP = 1.0  # between leaves
+ROUNDED_NOTE = "Numbers are rounded to some 0.1 % of the ranges; leaves_ has all their digits."
 CUT_NOTE = (
     "Only the first splits are drawn. A dashed box has the equation of all rows that reach it; the tree goes on there."
 )
@@ -53,10 +54,7 @@ class Layout:
     width: float
     height: float
     levels: tuple[float, float]  # the mean predictions that Item.level 0 and 1 stand for
-
-    @property
-    def is_cut(self) -> bool:
-        return any(item.is_cut for item in self.items)
+    notes: list[str]  # sentences that belong below the picture
 
 
 def em(text: str) -> float:
@@ -103,7 +101,12 @@ def layout_of(tree: Tree, width: float, most_leaves: int = MOST_LEAVES, most_dep
         if items[position].is_split:
             of = [item.middle for item in items[position + 1 :] if item.parent == position]
             items[position].middle = sum(of) / len(of)
-    return Layout(items, columns, width, at - GAP / 2, (low, high))
+    return Layout(items, columns, width, at - GAP / 2, (low, high), notes_of(tree, items))
+
+
+def notes_of(tree: Tree, items: list[Item]) -> list[str]:
+    """What a drawing leaves out: digits, and parts of the tree."""
+    return ([] if tree.is_short else [ROUNDED_NOTE]) + ([CUT_NOTE] if any(item.is_cut for item in items) else [])
 
 
 def items_of(tree: Tree, most_leaves: int = MOST_LEAVES, most_depth: int = MOST_DEPTH) -> list[Item]:
@@ -111,7 +114,7 @@ def items_of(tree: Tree, most_leaves: int = MOST_LEAVES, most_depth: int = MOST_
     if len(tree.leaves) > most_leaves:
         most_leaves = (most_leaves + 1) // 2
     drawn_nodes = 2 * most_leaves - 1  # nodes are in the order of growth: these are the tree with so many leaves
-    tolerances = tree.threshold_tolerances(drawn_nodes)
+    tolerances = None if tree.is_short else tree.threshold_tolerances(drawn_nodes)
     leaf_at = {leaf.node: leaf for leaf in tree.leaves}
     items: list[Item] = []
     waiting: list[Item] = [Item(0, None, 0)]
@@ -129,8 +132,6 @@ def items_of(tree: Tree, most_leaves: int = MOST_LEAVES, most_depth: int = MOST_
         for left in (False, True):
             what, how = tree.condition(item.node, left, tolerances)
             full = str(tree.condition(item.node, left))
-            if how.startswith("in {") and "," not in how:
-                how = "= " + how[4:-1]
             child = split["left"] if left else split["right"]
             waiting.append(
                 Item(child, position, item.depth + 1, what, how.replace("<=", "\N{LESS-THAN OR EQUAL TO}"), full)
@@ -170,7 +171,7 @@ def _describe(tree: Tree, item: Item, width: float) -> None:
     leaf = item.leaf
     assert leaf is not None
     most_targets = 4
-    most_lines = 3 if len(tree.targets) == 1 else 2
+    most_lines = 8 if tree.is_short else 3 if len(tree.targets) == 1 else 2
     left_out = 0
     for o, target in enumerate(tree.targets[:most_targets]):
         terms, smaller = tree.short_equation(leaf, o)

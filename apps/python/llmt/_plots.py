@@ -11,7 +11,7 @@ import numpy as np
 from ._explanation import Explanation
 from ._facts import facts_of
 from ._frames import curves
-from ._layout import CUT_NOTE, MOST_LEAVES, layout_of
+from ._layout import MOST_LEAVES, layout_of
 from ._tree import Tree, level_names, number, shown, trees
 
 _BLUE, _ORANGE, _GREY = "#2f86d1", "#d2603a", "#8c8c8c"
@@ -43,8 +43,9 @@ def plot_tree(
 ) -> Any:
     """The tree with the conditions on its branches and the equations in its leaves.
 
-    Coefficients have the digits that a prediction to 0.1 % of the target's range needs; `rules_frame` has them all. Of
-    a tree with more than `most_leaves` only the first splits are drawn. `target`: name or position of a target.
+    The numbers of a readable tree stand as they are. Others have the digits that a prediction to 0.1 % of the target's
+    range needs, which is said below the picture; `leaves_frame` has them all. Of a tree with more than `most_leaves`
+    only the first splits are drawn. `target`: name or position of a target.
     """
     tree = _tree_of(model, target)
     wide = _WIDTH * 72.0 / _EM
@@ -66,8 +67,8 @@ def plot_tree(
     if facts.errors:
         title += "; held-out RMSE " + ", ".join(f"{number(rmse)} ({name})" for name, rmse, _ in facts.errors)
     ax.set_title(title, loc="left", fontsize=size * 1.15, parse_math=False)
-    if layout.is_cut:
-        ax.text(0.0, layout.height + 0.6, CUT_NOTE, fontsize=size * 0.9, va="top", alpha=0.7)
+    for line, note in enumerate(layout.notes):
+        ax.text(0.0, layout.height + 0.6 + 1.3 * line, note, fontsize=size * 0.9, va="top", alpha=0.7)
     return ax
 
 

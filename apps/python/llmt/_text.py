@@ -6,7 +6,7 @@ import textwrap
 from typing import Any
 
 from ._facts import facts_of
-from ._layout import CUT_NOTE, MOST_LEAVES, Item, items_of
+from ._layout import MOST_LEAVES, Item, items_of, notes_of
 from ._tree import Tree, number, shown, trees
 
 
@@ -21,8 +21,8 @@ def tree_text(
 ) -> str:
     """The model as text in lines of about `width` letters; the other arguments are those of `tree_html`.
 
-    Coefficients and thresholds have the digits that the pictures have; `rules_frame` has them all. The equations of a
-    readable tree, which are rounded already, stand as they are.
+    Coefficients and thresholds have the digits that the pictures have: those of a readable tree as they are, others
+    rounded; `rules_frame` has them all.
     """
     parts = []
     for position, tree in enumerate(trees(model, lambda name: shown(name, 40))):
@@ -40,10 +40,10 @@ def tree_text(
                 lines.append(f"  {number(rmse):>9}{beside} {name}")
             lines += textwrap.wrap(_cost_of_reading(facts.errors) if readable else "", width)
         items = items_of(tree, most_leaves)
-        lines += ["", *_tree_lines(tree, items, width, readable)]
-        if any(item.is_cut for item in items):
-            note = CUT_NOTE.replace("drawn", "shown").replace("A dashed box", 'What begins with "..."')
-            lines += ["", *textwrap.wrap(note, width)]
+        lines += ["", *_tree_lines(tree, items, width)]
+        if notes := " ".join(notes_of(tree, items)):
+            notes = notes.replace("drawn", "shown").replace("A dashed box", 'What begins with "..."')
+            lines += ["", *textwrap.wrap(notes, width)]
         parts.append("\n".join(lines))
     return "\n\n".join(parts)
 
@@ -56,7 +56,7 @@ def _cost_of_reading(errors: list[tuple[str, float, float]]) -> str:
     return f"Reading costs {100.0 * cost:.0f} % more error; a smaller share, such as readable=0.05, costs less."
 
 
-def _tree_lines(tree: Tree, items: list[Item], width: int, readable: bool) -> list[str]:
+def _tree_lines(tree: Tree, items: list[Item], width: int) -> list[str]:
     lines = []
     for item in items:
         indent = "|  " * max(0, item.depth - 1)
@@ -73,7 +73,7 @@ def _tree_lines(tree: Tree, items: list[Item], width: int, readable: bool) -> li
         note = f"... {tree.leaves_below(item.node)} leaves, {note}" if item.is_cut else f"leaf {leaf.number}, {note}"
         lines += [f"{head}: {note}"] if len(head) + len(note) + 2 <= width else [f"{head}:", f"{indent}   {note}"]
         for o, target in enumerate(tree.targets):
-            terms, left_out = (tree.equation(leaf, o), 0) if readable else tree.short_equation(leaf, o)
+            terms, left_out = tree.short_equation(leaf, o)
             if left_out:
                 terms.append(f"+ {left_out} smaller term" + ("s" if left_out > 1 else ""))
             lines += _wrapped(f"{indent}   {target} = ", terms, f"{indent}       ", width)

@@ -7,6 +7,7 @@ import math
 import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -93,6 +94,19 @@ class Tree:
         """Whether a prediction may be a mean of several leaves' equations."""
         return self.partition["validity"]["kind"] != "crisp" and len(self.leaves) > 1
 
+    @cached_property
+    def is_short(self) -> bool:
+        """Whether all its numbers have few digits, as those of a readable tree have: all are then shown."""
+        splits = [node["split"] for node in self.nodes if "split" in node]
+        thresholds = [split["threshold"] for split in splits if split.get("threshold", _ANY_VALUE) < _ANY_VALUE]
+        if any("direction" in split for split in splits) or not all(map(_is_short, thresholds)):
+            return False
+        for leaf in self.leaves:
+            sums = np.abs(leaf.slope) @ np.abs(self.centres)  # whose rounding the intercept has
+            if not all(map(_is_short, leaf.slope.ravel())) or not all(map(_is_short, leaf.intercept, sums)):
+                return False
+        return True
+
     def condition(self, node: int, left: bool, tolerances: Mapping[int, float] | None = None) -> Condition:
         """The condition of one side of the node's split, in full or as rounded as `threshold_tolerances()` allows."""
         tolerance = None if tolerances is None else tolerances.get(self.nodes[node]["split"]["column"], 0.0)
@@ -117,11 +131,13 @@ class Tree:
         return self._words.equation(leaf.intercept[output], leaf.slope[output].tolist())
 
     def short_equation(self, leaf: Leaf, output: int = 0) -> tuple[list[str], int]:
-        """The equation for a picture, and how many terms it leaves out.
+        """The equation for a picture, and how many terms it leaves out: that of a short tree as it is.
 
-        Every coefficient has the digits that move a prediction by less than 0.1 % of the target's range in training;
-        terms that move it by less are left out. The terms stand by the size of what they move.
+        Else every coefficient has the digits that move a prediction by less than 0.1 % of the target's range in
+        training; terms that move it by less are left out. The terms stand by the size of what they move.
         """
+        if self.is_short:
+            return self.equation(leaf, output), 0
         of = self.outputs[output]
         tolerance = 1e-3 * (of["high"] - of["low"])
         root = self.nodes[0]
@@ -227,6 +243,11 @@ def level_names(of: dict[str, Any]) -> list[str]:
     """The names of the levels of an input; empty for numbers."""
     codes = of.get("codes") or []
     return [repr(float(code)).removesuffix(".0") for code in codes] if len(codes) else list(of.get("levels") or [])
+
+
+def _is_short(value: float, beside: float = 0.0) -> bool:
+    """Whether six digits say the number, up to the rounding of a sum of it and `beside`."""
+    return bool(abs(float(f"{value:.6g}") - value) <= 1e-12 * (abs(value) + beside))
 
 
 def _undetermined(scaled: np.ndarray, rank: int) -> np.ndarray:

@@ -67,8 +67,10 @@ std::string factor(const InputColumn& input) {
   return fmt::format("({} {} {})", input.name, input.centre < 0.0 ? "+" : "-", decimal(std::abs(input.centre)));
 }
 
-// "in {blue, red}"
+// "in {blue, red}", "= blue"
 std::string among(const InputColumn& input, const std::vector<int>& levels) {
+  if (levels.empty()) return "is no known category";
+  if (levels.size() == 1) return "= " + quoted_levels(input, levels);
   std::vector<int> others(input.levels.size());
   std::iota(others.begin(), others.end(), 0);
   std::erase_if(others, [&](int level) { return std::ranges::find(levels, level) != levels.end(); });

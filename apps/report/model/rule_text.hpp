@@ -17,7 +17,7 @@ std::string decimal(double value, std::optional<double> tolerance = {});
 /// Categories, separated by commas; one with a comma or a quote stands in quotes, as in a CSV file.
 std::string quoted_levels(const InputColumn& input, const std::vector<int>& levels);
 
-/// "colour in {blue, red}"; "colour not in {green}" where at least four times as many categories are in as not.
+/// "colour = blue", "colour in {blue, red}"; "colour not in {green}" where at least four times as many are in as not.
 std::string levels_text(const InputColumn& input, const std::vector<int>& levels);
 
 /// What is compared, and how: "age", "<= 21".

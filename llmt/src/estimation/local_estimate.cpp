@@ -4,6 +4,7 @@
 
 #include "estimation/constrained_estimate.hpp"
 #include "numerics/bounded_least_squares.hpp"
+#include "numerics/wide_ridge.hpp"
 #include "partition/tree.hpp"
 
 namespace llmt {
@@ -24,12 +25,22 @@ Eigen::MatrixXd sparse_model(const LeafSums& sums, std::size_t node, const Eigen
   return model;
 }
 
+// Where there are so many coefficients for each row, wide_ridge() is faster.
+constexpr Eigen::Index coefficients_per_row = 4;
+
 // A node's full model, under the signs of its slopes.
 Eigen::MatrixXd full_model(const LeafSums& sums, std::size_t node, const Eigen::MatrixXd& parent, double shrinkage) {
-  Eigen::MatrixXd matrix = sums.equations.gram[node];
-  matrix.diagonal() += shrinkage_diagonal(sums, node, shrinkage);
+  const Eigen::MatrixXd& gram = sums.equations.gram[node];
+  const Eigen::MatrixXd right = sums.equations.products[node] - gram * parent;
+  const Eigen::VectorXd diagonal = shrinkage_diagonal(sums, node, shrinkage);
+  const Eigen::Index rows = sums.training->count();
+  if (sums.signs.empty() && sums.size() > coefficients_per_row * rows) {
+    return parent + wide_ridge(gram, diagonal, right, rows);
+  }
+  Eigen::MatrixXd matrix = gram;
+  matrix.diagonal() += diagonal;
   const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
-  Eigen::MatrixXd model = parent + factor.solve(sums.equations.products[node] - sums.equations.gram[node] * parent);
+  Eigen::MatrixXd model = parent + factor.solve(right);
   for (Eigen::Index o = 0; o < model.cols() && !sums.signs.empty(); ++o) {
     const Eigen::VectorXd free = model.col(o) + sums.root.col(o);
     const Eigen::VectorXd constrained = nearest_with_signs(factor, free, sums.signs);

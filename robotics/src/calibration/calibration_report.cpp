@@ -51,9 +51,6 @@ Distances distances_of(const Fitted& fitted, const Measurements& measurements) {
 
 constexpr double implausible_share = 0.02;
 
-// Without the tool, which may have been fitted to anything.
-double length_of(const Chain& chain) { return reach_of(chain) - chain.tool.xyz_mm.norm(); }
-
 void hold_out(const Robot& robot, const Measurements& measurements, const ReportOptions& options, Work& work,
               CalibrationReport& report) {
   const Eigen::Index n = measurements.count();
@@ -207,7 +204,7 @@ std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& 
                                                : "; most likely " + likely));
   }
   if (nominal > implausible_mm) {
-    const std::string units = input_mistake(robot, measurements, implausible_mm);
+    const std::string units = input_mistake(robot, measurements, implausible_share);
     if (!units.empty()) found.push_back(units);
   }
   return found;

@@ -22,15 +22,18 @@
 namespace llmt::robotics {
 namespace {
 
-// A table as it may have been meant.
+// Description and table as they may have been meant.
 struct Change {
   std::function<void(Measurements&)> make;
   std::string words;
+  std::function<void(Chain&)> describe = {};  // empty: the description is right
 };
 
-std::vector<Change> changes_of(const Chain& chain) {
-  std::vector<Change> changes;
-  const auto joints = std::ssize(chain.joints);
+const auto as_it_stands = [](Measurements&) {};
+
+// Units of all angles, of all lengths. What is a thousand times too small or too large is the description where no arm
+// is of its size, else the table.
+void add_units(const Chain& chain, std::vector<Change>& changes) {
   const auto turn = [chain](double factor) {
     return [chain, factor](Measurements& table) {
       for (std::size_t j = 0; j < chain.joints.size(); ++j) {
@@ -39,10 +42,53 @@ std::vector<Change> changes_of(const Chain& chain) {
     };
   };
   const auto stretch = [](double factor) { return [factor](Measurements& table) { table.positions_mm *= factor; }; };
-  changes.push_back({turn(degrees), "the angles of the file are radians, not degrees"});
-  changes.push_back({turn(1.0 / degrees), "the angles of the file are degrees, not radians"});
-  changes.push_back({stretch(1000.0), "the measured positions are metres, not millimetres"});
-  changes.push_back({stretch(0.001), "the measured positions are millimetres, not metres"});
+  const auto described_turn = [](double factor) {
+    return [factor](Chain& meant) {
+      for (Joint& joint : meant.joints) {
+        for (double* angle : {&joint.alpha_deg, &joint.theta_deg, &joint.beta_deg}) *angle *= factor;
+      }
+    };
+  };
+  const auto described_stretch = [](double factor, bool with_tool) {
+    return [factor, with_tool](Chain& meant) {
+      for (Joint& joint : meant.joints) {
+        for (double* length : {&joint.a_mm, &joint.d_mm, &joint.b_mm}) *length *= factor;
+      }
+      if (with_tool) meant.tool.xyz_mm *= factor;
+    };
+  };
+  changes.push_back({turn(degrees), "the angles of the file are radians, not degrees (end their columns with _rad)"});
+  changes.push_back(
+      {turn(1.0 / degrees), "the angles of the file are degrees, not radians (end their columns with _deg)"});
+  changes.push_back({as_it_stands, "the angles of the description are radians, not degrees", described_turn(degrees)});
+  changes.push_back(
+      {as_it_stands, "the angles of the description are degrees, not radians", described_turn(1.0 / degrees)});
+  constexpr double shortest_mm = 20.0;
+  constexpr double longest_mm = 1e5;
+  const double length_mm = length_of(chain);
+  for (const bool with_tool : {true, false}) {
+    if (length_mm < shortest_mm) {
+      changes.push_back({as_it_stands, "the lengths of the description are metres, not millimetres",
+                         described_stretch(1000.0, with_tool)});
+    } else if (length_mm > longest_mm) {
+      changes.push_back({as_it_stands, "the lengths of the description are millimetres, not metres",
+                         described_stretch(0.001, with_tool)});
+    }
+  }
+  if (length_mm >= shortest_mm) {
+    changes.push_back(
+        {stretch(0.001), "the measured positions are millimetres, not metres (end their columns with _mm)"});
+  }
+  if (length_mm <= longest_mm) {
+    changes.push_back(
+        {stretch(1000.0), "the measured positions are metres, not millimetres (end their columns with _m)"});
+  }
+}
+
+std::vector<Change> changes_of(const Chain& chain) {
+  std::vector<Change> changes;
+  const auto joints = std::ssize(chain.joints);
+  add_units(chain, changes);
   changes.push_back({[](Measurements& table) { table.positions_mm.col(0).swap(table.positions_mm.col(1)); },
                      "x and y of the measured points are exchanged, or an axis of the instrument is reversed"});
   for (Eigen::Index j = 0; j < joints; ++j) {
@@ -151,28 +197,46 @@ double misfit_of(Robot robot, const Measurements& table) {
 
 }  // namespace
 
-std::string input_mistake(const Robot& robot, const Measurements& measurements, double plausible_mm) {
+// Without the tool, which may have been fitted to anything.
+double length_of(const Chain& chain) { return reach_of(chain) - chain.tool.xyz_mm.norm(); }
+
+std::string input_mistake(const Robot& robot, const Measurements& measurements, double plausible_share) {
   constexpr double far_better = 0.1;
   constexpr double of_spread = 0.05;
+  constexpr double as_good = 1.05;
   const Measurements table = some_of(measurements);
   const double misfit_mm = misfit_of(robot, table);
   std::vector<Change> changes = changes_of(robot.chain);
   add_units_of_targets(table.poses, changes);
   const std::size_t single = changes.size();
   add_sign_patterns(robot.chain, changes);
-  const Change* best = nullptr;
-  double smallest = std::min(far_better * misfit_mm, plausible_mm);
-  for (std::size_t k = 0; k < changes.size() && (k < single || best == nullptr); ++k) {
-    Measurements other = table;
-    changes[k].make(other);
-    const double misfit = misfit_of(robot, other);
-    if (misfit >= smallest || misfit >= of_spread * spread_of(other.positions_mm)) continue;
-    smallest = misfit;
-    best = &changes[k];
+  struct Explanation {
+    double share;  // of the spread of the points: units are compared by how well they fit, not by how small they are
+    double misfit_mm;
+    std::string words;
+  };
+  std::vector<Explanation> found;
+  const double largest = std::min(far_better * misfit_mm / spread_of(table.positions_mm), of_spread);
+  for (std::size_t k = 0; k < changes.size() && (k < single || found.empty()); ++k) {
+    Measurements meant = table;
+    changes[k].make(meant);
+    Robot arm = robot;
+    if (changes[k].describe) changes[k].describe(arm.chain);
+    const double misfit = misfit_of(arm, meant);
+    const double share = misfit / spread_of(meant.positions_mm);
+    if (share < largest && misfit < plausible_share * length_of(arm.chain)) {
+      found.push_back({share, misfit, changes[k].words});
+    }
   }
-  if (best == nullptr) return {};
+  if (found.empty()) return {};
+  const Explanation best = *std::ranges::min_element(found, {}, &Explanation::share);
+  std::vector<std::string> words;  // a wrist that counts the other way is one whose zero is half a turn away
+  for (const Explanation& one : found) {
+    if (one.share <= as_good * best.share && std::ranges::find(words, one.words) == words.end())
+      words.push_back(one.words);
+  }
   return fmt::format("most likely {}: the described robot would then miss the points by {:.3g} mm instead of {:.3g} mm",
-                     best->words, smallest, misfit_mm);
+                     fmt::join(words, ", or "), best.misfit_mm, misfit_mm);
 }
 
 std::string orientation_mistake(const Robot& robot, const Measurements& measurements) {

@@ -119,6 +119,7 @@ Verification verify(const Robots& robots, const PoseSplit& split, const discover
     verified.held_out.before = figures({robots.before, {}}, common);
     verified.held_out.after = figures(robots.improved, common);
     verified.held_out.poses = count_of_stands(split.test.poses);
+    verified.held_out.rows = split.aside;
   }
   verified.held_out.floor_from_repeats = lack_of_fit.has_enough_repeats();
   verified.held_out.floor_mm = mean_distance(verified.held_out.floor_from_repeats ? lack_of_fit.noise : noise_mm,

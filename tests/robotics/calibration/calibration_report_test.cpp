@@ -145,6 +145,26 @@ TEST(CalibrationReport, UnitsThatWouldFitAreNamed) {
   EXPECT_EQ(said_of(1.0, 1.5).find("most likely"), std::string::npos);  // no unit
 }
 
+TEST(CalibrationReport, UnitsOfTheDescriptionThatWouldFitAreNamed) {
+  const Robot truth = perturbed(ur_like(), 0.5, 0.05, 25);
+  const Measurements seen = measure(truth, random_poses(truth.chain, 60, 26), 0.05, 27);
+  const auto said_of = [&](double of_angles, double of_lengths) {
+    Robot wrong = ur_like();
+    for (Joint& joint : wrong.chain.joints) {
+      for (double* angle : {&joint.alpha_deg, &joint.theta_deg, &joint.beta_deg}) *angle *= of_angles;
+      for (double* length : {&joint.a_mm, &joint.d_mm, &joint.b_mm}) *length *= of_lengths;
+    }
+    const std::vector<std::string> found = input_mistakes(wrong, seen, report_calibration(wrong, seen, {.folds = 0}));
+    return found.empty() ? std::string() : found.back();
+  };
+  constexpr double degree = std::numbers::pi / 180.0;
+  EXPECT_EQ(said_of(1.0, 1.0), "");
+  EXPECT_EQ(said_of(degree, 1.0).find("most likely the angles of the description are radians, not degrees"), 0U);
+  EXPECT_EQ(said_of(1.0 / degree, 1.0).find("most likely the angles of the description are degrees, not radians"), 0U);
+  EXPECT_EQ(said_of(1.0, 1e-3).find("most likely the lengths of the description are metres, not millimetres"), 0U);
+  EXPECT_EQ(said_of(1.0, 1e3).find("most likely the lengths of the description are millimetres, not metres"), 0U);
+}
+
 TEST(Correction, IsTheSameSeenFromAnotherBase) {
   const Robot truth = perturbed(mdh_like(), 0.0, 0.0, 12);
   const Measurements seen = with_step(truth, 300, 0.002, 13);

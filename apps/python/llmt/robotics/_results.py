@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
+
+import numpy as np
 
 from llmt._files import write_text
 from llmt._frames import table_of
-from llmt._results import Findings, Result, draw_points, html_table
+from llmt._results import Findings, Result, axes_of, draw_points, html_table
 from llmt.robotics._csv import frame_of
 from llmt.robotics._robot import Robot, RobotWarning
 
@@ -19,8 +21,11 @@ __all__ = ["Calibration", "Check", "Commands", "Discovery", "PoseChoice", "Robot
 def _draw_errors(ax: Any, errors: Mapping[str, Any], title: str, lines: Mapping[str, float] = {}) -> Any:
     count = len(next(iter(errors.values())))
     ax = draw_points(ax, range(count), errors, x="measured point", y="position error, mm", title=title, lines=lines)
-    highest = max([*(error for of in errors.values() for error in of), *lines.values()])
-    ax.set_ylim(0.0, 1.35 * highest or None)  # room for the legend above the points
+    return _with_legend_above(ax, [*(error for of in errors.values() for error in of), *lines.values()])
+
+
+def _with_legend_above(ax: Any, values: Iterable[float], lines: int = 2) -> Any:
+    ax.set_ylim(0.0, (1.1 + 0.12 * lines) * max(values) or None)
     ax.legend(loc="upper right")
     return ax
 
@@ -47,8 +52,7 @@ class _WithRobot(_RobotResult):
 
     @property
     def poses(self) -> Any:
-        """Distance in mm between model and measurement under each model, a row for each measured point: of a discovery
-        with test poses, those."""
+        """Distance in mm between model and measurement under each model, a row for each measured point."""
         count = len(next(iter(self._errors.values())))
         return table_of([{f"{name}_mm": errors[k] for name, errors in self._errors.items()} for k in range(count)])
 
@@ -108,9 +112,37 @@ class Discovery(_WithRobot, Findings):
     def __init__(self, made: Mapping[str, Any], has_test: bool) -> None:
         super().__init__(made)
         self._has_test = has_test
+        self._set_aside: list[bool] = made["set_aside"]
+
+    @property
+    def poses(self) -> Any:
+        """Distance in mm between the measurement and the model ``before`` and ``after``, a row for each measured point.
+        ``set_aside``: the point took no part in the search and judges what it found. With test poses the rows are
+        theirs, and all are set aside."""
+        count = len(self._errors["before"])
+        aside = self._set_aside or [True] * count
+        rows = zip(self._errors["before"], self._errors["after"], aside, strict=True)
+        return table_of([{"before_mm": before, "after_mm": after, "set_aside": of} for before, after, of in rows])
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draws the errors of ``poses`` in the order of the table: points searched pale, those set aside in full
+        colour, with the means that the page gives. Returns the axes of matplotlib, ``ax`` if it is given."""
+        if not any(self._set_aside):
+            return super().plot(ax)
+        ax = axes_of(ax)
+        rows = np.arange(len(self._set_aside))
+        aside = np.array(self._set_aside)
+        for place, (name, of) in enumerate(self._errors.items()):
+            errors = np.array(of)
+            colour = f"C{place}"
+            label = f"{name}, set aside, mean {errors[aside].mean():.4f} mm"
+            ax.plot(rows[~aside], errors[~aside], ".", color=colour, alpha=0.25, label=f"{name}, searched")
+            ax.plot(rows[aside], errors[aside], "o", markersize=4, color=colour, label=label)
+        ax.set(xlabel="measured point", ylabel="position error, mm", title="Points searched, and set aside")
+        return _with_legend_above(ax, [error for of in self._errors.values() for error in of], lines=4)
 
     def _where(self) -> str:
-        return "on the test poses" if self._has_test else "on all poses, those searched and those set aside"
+        return "on the test poses" if self._has_test else "on all poses; none were set aside"
 
     @property
     def summary(self) -> str:

@@ -78,38 +78,6 @@ def _checked(source: Source, columns: Any, arm: Any) -> Source:
     return source
 
 
-def _likely_causes(arm: Any, source: Source) -> list[str]:
-    """Units that the numbers of a table in memory do not look like."""
-    if source[1] is None:
-        return []
-    table = frame_of(source[1])
-    angles = {name: np.abs(np.asarray(table[name], dtype=float)) for name in table if re.search("_(deg|rad)$", name)}
-    causes = []
-    radians = {name: np.nanmax(of) for name, of in angles.items() if re.fullmatch("q[0-9]+_rad", name)}
-    large = {name: most for name, most in radians.items() if most > 4 * np.pi}
-    if large:
-        name, most = next(iter(large.items()))
-        others = f"; also {', '.join(list(large)[1:])}" if len(large) > 1 else ""
-        causes.append(f"{name} reaches {most:.4g}: these look like degrees; rename {name} to {name[:-3]}deg{others}")
-    joints = {name: of for name, of in angles.items() if re.fullmatch("q[0-9]+_deg", name)}
-    if len(joints) > 1 and max(np.nanmax(of) for of in joints.values()) <= np.pi:
-        causes.append("no joint is beyond 3.1416 deg: these look like radians; rename q1_deg to q1_rad, and so on")
-    if {"x_mm", "y_mm", "z_mm"} <= set(table) and not causes:
-        described = frame_of(_extension().predict(arm._bound, source, _reading(None), as_measured=False)["csv"])
-        spans = [max(float(np.ptp(np.asarray(of[f"{axis}_mm"]))) for axis in "xyz") for of in (table, described)]
-        if spans[0] > 0.0 and spans[1] > 100.0 * spans[0]:
-            causes.append(
-                f"the measured points span {spans[0]:.3g} mm, those of the description {spans[1]:.3g} mm: x_mm, y_mm and "
-                "z_mm look like metres; rename them to x_m, y_m and z_m"
-            )
-        elif spans[0] > 100.0 * spans[1] > 0.0:
-            causes.append(
-                f"the measured points span {spans[0]:.3g} mm, those of the description {spans[1]:.3g} mm: the lengths of "
-                "the description look like metres; they are in mm"
-            )
-    return causes
-
-
 def _minus_two(lines: str) -> str:
     """The rows, counted from 0, of lines below a header."""
     return re.sub("[0-9]+", lambda line: str(int(line[0]) - 2), lines)
@@ -226,40 +194,36 @@ def calibrate(
     Raises
     ------
     ValueError
-        Also where the calibrated robot misses half of the points by more than a fiftieth of its length.
+        Also where the calibrated robot misses half of the points by more than a fiftieth of its length. Then one
+        mistake after another is tried, such as degrees for radians or a joint that counts the other way, and the one
+        that would explain it is named.
     """
     if new_session and test is None:
         raise ValueError("new_session is about test, which is not given")
     arm = _robot_of(robot)
     given = _checked(source_of(measured, "measured"), columns, arm)
     priors = {name: number(f"prior {name}", sigma, 1e-9, _LARGEST) for name, sigma in (prior or {}).items()}
-    try:
-        made = _extension().calibrate(
-            arm._bound,
-            given,
-            _optional(test, "test"),
-            _reading(columns, orientations, decimal_comma),
-            correct=bool(correct),
-            folds=_folds(folds),
-            contiguous=bool(contiguous),
-            new_session=bool(new_session),
-            robust=bool(robust),
-            fixed=names("fix", fix),
-            only=names("only", only),
-            priors=priors,
-            max_leaves=number("max_leaves", max_leaves, 0, 2**31 - 1, whole=True),
-            min_leaf=number("min_leaf", min_leaf, 0, _MOST, whole=True),
-            seed=number("seed", seed, 0, 2**64 - 1, whole=True),
-            threads=number("threads", threads, 0, 2**31 - 1, whole=True),
-            quality=bool(quality),
-            page=report is not None,
-            report=progress,
-        )
-    except ValueError as error:
-        causes = _likely_causes(arm, given) if "a fiftieth of its length" in str(error) else []
-        if causes:
-            raise ValueError(f"{error}. Likely: {'; '.join(causes)}") from None
-        raise
+    made = _extension().calibrate(
+        arm._bound,
+        given,
+        _optional(test, "test"),
+        _reading(columns, orientations, decimal_comma),
+        correct=bool(correct),
+        folds=_folds(folds),
+        contiguous=bool(contiguous),
+        new_session=bool(new_session),
+        robust=bool(robust),
+        fixed=names("fix", fix),
+        only=names("only", only),
+        priors=priors,
+        max_leaves=number("max_leaves", max_leaves, 0, 2**31 - 1, whole=True),
+        min_leaf=number("min_leaf", min_leaf, 0, _MOST, whole=True),
+        seed=number("seed", seed, 0, 2**64 - 1, whole=True),
+        threads=number("threads", threads, 0, 2**31 - 1, whole=True),
+        quality=bool(quality),
+        page=report is not None,
+        report=progress,
+    )
     made["warnings"] = [*made["warnings"], *_on_the_page(made, given), *_common_scale(made, arm)]
     _write_page(report, made)
     return Calibration(_warned(made))

@@ -163,9 +163,11 @@ def _refuse_nan(raw: Raw, name: str) -> None:
     missing = np.isnan(raw.values)
     if missing.any():
         rows, columns = np.nonzero(missing)
+        count = len(np.unique(rows))
+        many = "leave this row out" if count == 1 else f"{count} rows have one: leave these rows out"
         raise ValueError(
-            f"Input {name} contains NaN.\nThe first is in row {rows[0]} of {place_of(raw, int(columns[0]), name)}; "
-            f"{len(np.unique(rows))} rows have one: leave these rows out."
+            f"Input {name} contains NaN.\n"
+            f"The first is in row {rows[0]} of {place_of(raw, int(columns[0]), name)}; {many}."
         )
 
 

@@ -87,6 +87,7 @@ PoseSplit set_aside(const Measurements& measurements, const std::optional<Measur
     std::ranges::sort(searched);
     std::ranges::sort(tested);
     split.test = select(measurements, tested);
+    split.aside = std::move(tested);
   }
   split.searched = select(measurements, searched);
   split.samples = averaged(split.searched, repeats, split.rows);

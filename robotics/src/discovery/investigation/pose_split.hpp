@@ -16,6 +16,7 @@ enum class Repeats { as_marked, averaged };
 struct PoseSplit {
   Measurements searched;
   Measurements test;                            ///< no poses: nothing was set aside
+  std::vector<Eigen::Index> aside;              ///< rows of the file that `test` holds, ascending; none if it was given
   Measurements samples;                         ///< `searched` with readings of an arm that stood still averaged
   std::vector<std::vector<Eigen::Index>> rows;  ///< of the file, behind every sample
 };

@@ -96,6 +96,7 @@ struct HeldOut {
   double floor_mm = 0.0;  ///< mean distance between a perfect model and measurements with this noise
   bool floor_from_repeats = false;
   Eigen::Index poses = 0;
+  std::vector<Eigen::Index> rows;  ///< of the measurements, from 0, that were set aside; none of test measurements
 };
 
 /// The answer in the words of a page for people. Answer, headline and FoundEffect::confirmed come from one table
