@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pdoc
 
-MODULES = ["llmt", "llmt.export", "llmt.mujoco", "llmt.robotics", "llmt.srbench"]
+MODULES = ["llmt", "llmt.dask", "llmt.distributed", "llmt.export", "llmt.mujoco", "llmt.robotics", "llmt.srbench"]
 
 
 def own_what_is_inherited(cls: type) -> None:
