@@ -68,6 +68,8 @@ def main() -> int:
         "block_rows": 8192,
         "estimator": LocalLinearTreeRegressor(validity="crisp", max_leaves=8, n_jobs=1),
     }
+    # On a busy machine a worker takes longer to start again than the minute that Dask allows.
+    of_workers = {"threads_per_worker": 1, "dashboard_address": None, "death_timeout": 600}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_table(folder, given.rows, given.files)
@@ -76,7 +78,7 @@ def main() -> int:
         print(f"one process: {time.monotonic() - begin:.1f} s, {given.rows} rows in {given.files} files")
         same = True
         for count in given.workers:
-            with LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None) as cluster:
+            with LocalCluster(n_workers=count, **of_workers) as cluster:
                 with Client(cluster) as client, get_task_stream(client) as stream:
                     passes = Passes()
                     begin = time.monotonic()
@@ -90,7 +92,7 @@ def main() -> int:
         print("bytes of the sums:", ", ".join(f"{step} {count}" for step, count in passes.bytes))
         random.seed(1)
         killed: list[int] = []
-        with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        with LocalCluster(n_workers=2, **of_workers) as cluster:
             with Client(cluster) as client:
                 fits = 0
                 while len(killed) < given.kills:
