@@ -38,7 +38,8 @@ const std::string& written() {
     int batch = 0;
     llmt::write_arrow(path(), names, [&]() -> std::optional<Eigen::MatrixXd> {
       if (batch == 3) return std::nullopt;
-      Eigen::MatrixXd rows = Eigen::MatrixXd::Constant(5 + batch, 3, 0.5 * ++batch);
+      ++batch;
+      Eigen::MatrixXd rows = Eigen::MatrixXd::Constant(4 + batch, 3, 0.5 * batch);
       rows(2, 1) = std::nan("");
       return rows;
     });
