@@ -38,7 +38,7 @@ void refuse_options_of_csv(const CLI::App& command) {
       "data",     "target", "inputs",       "ignore",     "cv",        "max-leaves", "min-leaf", "threads",
       "validity", "width",  "jump",         "ridge",      "shrinkage", "estimation", "sparse",   "significance",
       "seed",     "prune",  "no-intervals", "checkpoint", "resume",    "rule"};
-  constexpr std::array<std::string_view, 5> more = {"memory", "output", "json", "loss", "local-models"};
+  constexpr std::array<std::string_view, 6> more = {"memory", "output", "json", "loss", "local-models", "patience"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_single_name();
     if (option->count() > 0 && std::ranges::find(taken, name) == taken.end() &&

@@ -13,6 +13,7 @@ import threading
 import time
 from pathlib import Path
 
+import dask
 import numpy as np
 import pandas as pd
 
@@ -68,7 +69,8 @@ def main() -> int:
         "block_rows": 8192,
         "estimator": LocalLinearTreeRegressor(validity="crisp", max_leaves=8, n_jobs=1),
     }
-    # On a busy machine a worker takes longer to start again than the minute that Dask allows.
+    # On a busy machine a worker takes longer to start again than the 15 s after which LocalCluster gives it up.
+    dask.config.set({"distributed.deploy.lost-worker-timeout": "600 s"})
     of_workers = {"threads_per_worker": 1, "dashboard_address": None, "death_timeout": 600}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -56,3 +56,4 @@ grep -q "has waited" log || fail "no word of patience: $(cat log)"
 head -c 100000 d.arrow >short.arrow && mv short.arrow d.arrow
 if mpi 2 2>log; then fail "a file that was cut off was read"; fi
 grep -q "d.arrow: " log || fail "the file is not named: $(cat log)"
+say "all claims hold"
