@@ -17,6 +17,7 @@
 #include "llmt/distributed.hpp"
 #include "llmt/files.hpp"
 #include "shared/cli.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -37,7 +38,7 @@ void refuse_options_of_csv(const CLI::App& command) {
       "data",     "target", "inputs",       "ignore",     "cv",        "max-leaves", "min-leaf", "threads",
       "validity", "width",  "jump",         "ridge",      "shrinkage", "estimation", "sparse",   "significance",
       "seed",     "prune",  "no-intervals", "checkpoint", "resume",    "rule"};
-  constexpr std::array<std::string_view, 5> more = {"memory", "output", "json", "loss", "local-models"};
+  constexpr std::array<std::string_view, 6> more = {"memory", "output", "json", "loss", "local-models", "patience"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_single_name();
     if (option->count() > 0 && std::ranges::find(taken, name) == taken.end() &&
@@ -45,6 +46,19 @@ void refuse_options_of_csv(const CLI::App& command) {
       throw std::invalid_argument(fmt::format("--{} is not for Arrow files; give the table as CSV", name));
     }
   }
+}
+
+// The rows first ... last - 1.
+struct RowRange {
+  Eigen::Index first;
+  Eigen::Index last;
+};
+
+// The blocks of a process are neighbours, so that their sums are few.
+RowRange rows_of(const Processes& processes, Eigen::Index rows, Eigen::Index block_rows) {
+  const Eigen::Index blocks = (rows + block_rows - 1) / block_rows;
+  const auto begin = [&](Eigen::Index rank) { return std::min(rows, blocks * rank / processes.count() * block_rows); };
+  return {begin(processes.rank()), begin(processes.rank() + 1)};
 }
 
 double memory_of(const ArrowFitArguments& arguments) {
@@ -66,18 +80,18 @@ void check_arrow_rows(const ArrowTable& table, const std::vector<std::string>& c
   }
 }
 
-// One pass over the rows. `columns`: inputs, target.
-distributed::Sums sum_table(const ArrowTable& table, const std::vector<std::string>& columns,
-                            const distributed::State& state, Eigen::Index block_rows, int threads, ProgressBar& bar) {
+// One pass over the rows first ... last - 1, which begin with a block. `columns`: inputs, target.
+distributed::Sums sum_rows(const ArrowTable& table, RowRange range, const std::vector<std::string>& columns,
+                           const distributed::State& state, Eigen::Index block_rows, int threads, ProgressBar& bar) {
   distributed::Sums all;
   const Eigen::Index inputs = std::ssize(columns) - 1;
-  for (Eigen::Index first = 0; first < table.rows(); first += blocks_at_once * block_rows) {
-    const Eigen::Index count = std::min(blocks_at_once * block_rows, table.rows() - first);
+  for (Eigen::Index first = range.first; first < range.last; first += blocks_at_once * block_rows) {
+    const Eigen::Index count = std::min(blocks_at_once * block_rows, range.last - first);
     const Eigen::MatrixXd rows = table.read(first, count, columns);
     check_arrow_rows(table, columns, rows, first);
     all = merge(std::move(all),
                 distributed::sums({rows.leftCols(inputs), rows.col(inputs), first / block_rows}, state, threads));
-    bar.show(first + count, table.rows());
+    bar.show(first + count - range.first, range.last - range.first);
   }
   return all;
 }
@@ -131,7 +145,17 @@ double read_memory(const std::string& text) {
   return value * std::pow(1024.0, static_cast<double>(at) + 1.0);
 }
 
-void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& arguments) {
+void add_arrow_fit_options(CLI::App& command, ArrowFitArguments& arguments) {
+  command
+      .add_option("--memory", arguments.memory,
+                  "Of an Arrow file: memory that the fit may take, such as 4G [half of the machine's]")
+      ->type_name("BYTES");
+  add_output_file(command, "--checkpoint", arguments.checkpoint,
+                  "Of an Arrow file: where the fit stands after every pass over the rows");
+  command.add_flag("--resume", arguments.resume, "Go on from the file of --checkpoint if there is one");
+}
+
+void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& arguments, Processes& processes) {
   refuse_options_of_csv(command);
   if (arguments.resume && arguments.checkpoint.empty()) {
     throw std::invalid_argument("--resume goes on from the file of --checkpoint, which is not given");
@@ -153,18 +177,27 @@ void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& argumen
   const double row_bytes = 8.0 * static_cast<double>(columns.size() + 1);
   options.branch_rows = std::max<Eigen::Index>(
       100, static_cast<Eigen::Index>(part_for_branches * memory_of(arguments) / (bytes_per_byte * row_bytes)));
-  distributed::State state = first_state(arguments, columns, options);
+  const bool is_first = processes.rank() == 0;
+  distributed::State state = distributed::State::from_bytes(
+      processes.of_first(is_first ? first_state(arguments, columns, options).to_bytes() : std::string()));
   columns.push_back(learning.targets.front());
+  const RowRange range = rows_of(processes, table.rows(), options.block_rows);
   const int threads = learning.options.max_threads;
   while (!state.finished()) {
     ProgressBar bar(
         fmt::format("pass {} ({})", state.counts().passes + 1, name_of_step[static_cast<std::size_t>(state.step())]));
-    distributed::Sums all = sum_table(table, columns, state, options.block_rows, threads, bar);
-    state = distributed::advance(state, std::move(all), {}, threads);
-    if (!arguments.checkpoint.empty()) write_file(arguments.checkpoint, state.to_bytes());
+    distributed::Sums all = processes.merged(sum_rows(table, range, columns, state, options.block_rows, threads, bar));
+    std::string next;
+    if (is_first) {
+      next = distributed::advance(state, std::move(all), {}, threads).to_bytes();
+      if (!arguments.checkpoint.empty()) write_file(arguments.checkpoint, next);
+    }
+    state = distributed::State::from_bytes(processes.of_first(std::move(next)));
   }
+  if (!is_first) return;
   if (!arguments.output.empty()) write_file(arguments.output, state.model_json());
   print_result(arguments, state);
+  if (!arguments.json) print(processes.cost());
 }
 
 }  // namespace llmt::apps

@@ -33,9 +33,7 @@ struct FitArguments {
   bool no_intervals = false;
   bool stream = false;
   bool boost = false;
-  std::string memory;
-  std::string checkpoint;
-  bool resume = false;
+  ArrowFitArguments arrow;
   std::string readable;  ///< the loss in per cent; empty: none is asked for
   ReportFiles reports;
 };
@@ -174,17 +172,16 @@ void add_fit(CLI::App& app) {
   command->add_flag("--boost", arguments->boost,
                     "A sum of many small trees, each fitted to what those before it leave: more accurate than one tree "
                     "as a rule, and nobody reads it");
-  command
-      ->add_option("--memory", arguments->memory,
-                   "Of an Arrow file: memory that the fit may take, such as 4G [half of the machine's]")
-      ->type_name("BYTES");
-  add_output_file(*command, "--checkpoint", arguments->checkpoint,
-                  "Of an Arrow file: where the fit stands after every pass over the rows");
-  command->add_flag("--resume", arguments->resume, "Go on from the file of --checkpoint if there is one");
+  add_arrow_fit_options(*command, arguments->arrow);
   command->callback([command, arguments] {
     if (is_arrow_file(arguments->learning.data)) {
-      arrow_fit_command(*command, {arguments->learning, arguments->output, arguments->json, arguments->no_intervals,
-                                   arguments->memory, arguments->checkpoint, arguments->resume});
+      ArrowFitArguments arrow = arguments->arrow;
+      arrow.learning = arguments->learning;
+      arrow.output = arguments->output;
+      arrow.json = arguments->json;
+      arrow.no_intervals = arguments->no_intervals;
+      Processes alone;
+      arrow_fit_command(*command, arrow, alone);
       return;
     }
     for (const char* option : {"--memory", "--checkpoint", "--resume"}) {

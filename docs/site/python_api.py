@@ -7,7 +7,16 @@ from pathlib import Path
 
 import pdoc
 
-MODULES = ["llmt", "llmt.export", "llmt.mujoco", "llmt.robotics", "llmt.samples", "llmt.srbench"]
+MODULES = [
+    "llmt",
+    "llmt.dask",
+    "llmt.distributed",
+    "llmt.export",
+    "llmt.mujoco",
+    "llmt.robotics",
+    "llmt.samples",
+    "llmt.srbench",
+]
 
 
 def own_what_is_inherited(cls: type) -> None:

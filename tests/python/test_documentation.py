@@ -55,6 +55,8 @@ def test_a_program_of_the_documentation_runs(program, tmp_path):
 def test_the_blocks_of_a_page_run_one_after_the_other(page, tmp_path):
     for module in ("matplotlib", "onnx", "pandas", "sklearn", "sympy"):
         pytest.importorskip(module)
+    if "dask" in page.read_text(encoding="utf-8"):
+        pytest.importorskip("dask.dataframe")
     (tmp_path / "docs").symlink_to(ROOT / "docs")  # what blocks write is not left in the repository
     blocks = re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
     environment = {**os.environ, "PYTHONPATH": str(Path(llmt.__path__[0]).resolve().parent), "MPLBACKEND": "agg"}

@@ -21,8 +21,16 @@ NB_MODULE(_core, module) {
         llmt::python::write_or_raise({&file, 1});
       },
       nanobind::arg("path"), nanobind::arg("content"), "Writes a file as a whole or, with an OSError, not at all.");
+  module.def(
+      "write_file",
+      [](const nanobind::bytes& path, const nanobind::bytes& content) {
+        const llmt::NewFile file{{path.c_str(), path.size()}, {content.c_str(), content.size()}};
+        llmt::python::write_or_raise({&file, 1});
+      },
+      nanobind::arg("path"), nanobind::arg("content"));
   llmt::python::add_arrow(module);
   llmt::python::add_models(module);
+  llmt::python::add_distributed(module);
   llmt::python::add_fitting(module);
   llmt::python::add_found(module);
   llmt::python::add_signals(module);

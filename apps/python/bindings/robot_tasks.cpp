@@ -258,7 +258,7 @@ nb::dict simulate(const Arm& arm, Eigen::Index count, const std::optional<Source
   return result;
 }
 
-nb::dict predict(const Arm& arm, const Source& at, const Reading& reading, bool as_measured) {
+nb::dict predict_poses(const Arm& arm, const Source& at, const Reading& reading, bool as_measured) {
   Outcome outcome;
   std::string csv;
   interruptible(
@@ -322,7 +322,7 @@ void add_robot_tasks(nb::module_& module) {
              arg("report").none());
   module.def("simulate", &simulate, arg("robot"), arg("count"), arg("at").none(), arg("reading"), nb::kw_only(),
              arg("noise_um"), arg("seed"));
-  module.def("predict", &predict, arg("robot"), arg("at"), arg("reading"), nb::kw_only(), arg("as_measured"));
+  module.def("predict", &predict_poses, arg("robot"), arg("at"), arg("reading"), nb::kw_only(), arg("as_measured"));
   module.def("export_c", &export_c, arg("robot"), arg("name"));
   module.def("export_geometry", &export_geometry, arg("robot"), arg("nominal").none());
 }

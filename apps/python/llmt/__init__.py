@@ -8,8 +8,8 @@
 >>> model.predict([[0.5, 0.5], [-0.5, 0.5]]).round(1)
 array([1.5, 1. ])
 
-NumPy is all that it needs. scikit-learn, pandas, polars, pyarrow, matplotlib, shap and onnx are used where they are
-installed; none of them is imported before something is called that needs it.
+NumPy is all that it needs. scikit-learn, pandas, polars, pyarrow, matplotlib, shap, onnx and Dask are used where they
+are installed; none of them is imported before something is called that needs it.
 """
 
 from importlib import import_module

@@ -317,23 +317,24 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
     @classmethod
     def load(cls, path: "str | os.PathLike[str]") -> "LocalLinearTreeRegressor":
         """An estimator with the model of a file. What belongs to the fit alone, such as summary_, is not in files."""
-        estimator = cls()
-        model = Model.load(path)
+        return cls()._take_model(Model.load(path))
+
+    def _take_model(self, model: Model) -> "LocalLinearTreeRegressor":
         columns = model.handle.inputs()
-        estimator.model_ = estimator.accurate_model_ = model
-        estimator._inputs = [column["name"] for column in columns]
-        estimator._outputs = model.handle.outputs()
-        estimator._levels = [list(column["levels"]) if not column["codes"] else [] for column in columns]
-        estimator.n_features_in_ = len(columns)
-        estimator.feature_names_in_ = np.asarray(estimator._inputs, dtype=object)
-        estimator.n_outputs_ = len(estimator._outputs)
-        estimator._is_flat = estimator.n_outputs_ == 1
-        estimator._fit = estimator._mean = None
-        estimator._stream = None
-        estimator._is_readable = False
-        estimator._sample = np.array([[column["centre"] for column in columns]])
-        estimator.summary_ = {}
-        return estimator
+        self.model_ = self.accurate_model_ = model
+        self._inputs = [column["name"] for column in columns]
+        self._outputs = model.handle.outputs()
+        self._levels = [list(column["levels"]) if not column["codes"] else [] for column in columns]
+        self.n_features_in_ = len(columns)
+        self.feature_names_in_ = np.asarray(self._inputs, dtype=object)
+        self.n_outputs_ = len(self._outputs)
+        self._is_flat = self.n_outputs_ == 1
+        self._fit = self._mean = None
+        self._stream = None
+        self._is_readable = False
+        self._sample = np.array([[column["centre"] for column in columns]])
+        self.summary_ = {}
+        return self
 
     def __getstate__(self) -> dict[str, Any]:
         state = dict(super().__getstate__())
@@ -412,10 +413,16 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         return _count("random_state", self.random_state)
 
     def _options(self, table: Table) -> dict[str, Any]:
+        options = self._options_without_columns()
+        if self.monotonic_cst is not None:
+            options["trends"] = _signs(self.monotonic_cst, self._inputs, table)
+        return options
+
+    def _options_without_columns(self) -> dict[str, Any]:
         for name, choices in _choices.items():
             if getattr(self, name) not in choices:
                 raise ValueError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(choices)}")
-        options = {
+        return {
             "max_leaves": _count("max_leaves", self.max_leaves),
             "min_leaf_samples": _count("min_samples_leaf", self.min_samples_leaf),
             "rule": self.rule,
@@ -430,9 +437,6 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
             "shared_partition": bool(self.shared_tree),
             "max_threads": self._threads(),
         }
-        if self.monotonic_cst is not None:
-            options["trends"] = _signs(self.monotonic_cst, self._inputs, table)
-        return options
 
 
 def _check_rows(inputs: int, outputs: int) -> None:

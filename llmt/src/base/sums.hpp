@@ -117,6 +117,10 @@ void read(std::string_view& bytes, T& sum) {
     if (rows < 0 || cols < 0 || (cols > 0 && rows > most / cols)) {
       throw std::runtime_error("llmt: the bytes of a sum are cut off");
     }
+    const auto fits = [](int fixed, Eigen::Index size) { return fixed == Eigen::Dynamic || fixed == size; };
+    if (!fits(T::RowsAtCompileTime, rows) || !fits(T::ColsAtCompileTime, cols)) {
+      throw std::runtime_error("llmt: the bytes of a sum hold a matrix where a vector is expected");
+    }
     sum.resize(rows, cols);
     take(sum.data(), sum.size() * sizeof(typename T::Scalar));
   } else if constexpr (HasFields<T>) {

@@ -149,4 +149,11 @@ TEST(SumOver, RefusesBytesThatAreCutOffOrTooMany) {
   EXPECT_THROW(llmt::from_bytes<BlockSums<Sums>>(bytes + '\0'), std::runtime_error);
 }
 
+TEST(SumOver, BytesOfAMatrixAreNoVector) {
+  EXPECT_EQ(llmt::from_bytes<Eigen::VectorXd>(llmt::to_bytes(Eigen::VectorXd(3))).size(), 3);
+  for (const Eigen::MatrixXd& matrix : {Eigen::MatrixXd(3, 0), Eigen::MatrixXd(3, 2)}) {
+    EXPECT_THROW(llmt::from_bytes<Eigen::VectorXd>(llmt::to_bytes(matrix)), std::runtime_error);
+  }
+}
+
 }  // namespace
