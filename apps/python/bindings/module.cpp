@@ -20,6 +20,7 @@ NB_MODULE(_core, module) {
       nanobind::arg("path"), nanobind::arg("content"), "Writes a file as a whole or, with an OSError, not at all.");
   llmt::python::add_arrow(module);
   llmt::python::add_models(module);
+  llmt::python::add_boosted(module);
   llmt::python::add_fitting(module);
   llmt::python::add_found(module);
   llmt::python::add_signals(module);
