@@ -31,6 +31,11 @@ void refuse_options_of_one_tree(const CLI::App& command) {
 void boost_command(const CLI::App& command, const BoostArguments& arguments) {
   refuse_options_of_one_tree(command);
   const LearningTable table = read_learning_table(arguments.learning);
+  if (const Eigen::Index rows = table.data->outputs.rows(); rows < fewest_boosted_rows) {
+    throw std::runtime_error(
+        fmt::format("{}: {} row{}; --boost needs at least {} that differ, llmt fit without --boost takes fewer",
+                    table_name(arguments.learning.data), rows, rows == 1 ? "" : "s", fewest_boosted_rows));
+  }
   const BoostOptions options{.max_threads = table.options.max_threads};
   ProgressBar bar("boosting");
   const BoostResult result = fit_boosted(*table.data, options, bar.callback());

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
@@ -39,7 +41,10 @@ void compare_command(CompareArguments arguments) {
   options.folds = arguments.learning.options.folds;
   ProgressBar bar("fitting");
   options.progress = bar.callback();
-  const ComparisonResult result = compare(*table.data, usual_methods(table.options, *table.data), options);
+  std::vector<Method> methods = usual_methods(table.options, *table.data);
+  const std::string no_sum = why_not_boosted(table.options, *table.data);
+  if (no_sum.empty()) methods.push_back(boosted_method(table.options));
+  const ComparisonResult result = compare(*table.data, methods, options);
   bar.clear();
   std::string reports;
   if (arguments.reports.wanted()) {
@@ -54,13 +59,16 @@ void compare_command(CompareArguments arguments) {
     return;
   }
   run.data = table_name(run.data);
-  print(report::comparison_text(run, target, result, output_width()) + reports);
+  print(report::comparison_text(run, target, result, output_width()));
+  if (!no_sum.empty()) print(fmt::format("A sum of trees (--boost) is not compared: {}.\n", no_sum));
+  print(reports);
 }
 
 }  // namespace
 
 void add_compare(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("compare", "Compare smooth and discontinuous trees on held-out rows");
+  CLI::App* command =
+      app.add_subcommand("compare", "Compare smooth and discontinuous trees, and a sum of trees, on held-out rows");
   command->footer("Example: llmt compare concrete.csv --target strength");
   const auto arguments = std::make_shared<CompareArguments>();
   add_learning_options(*command, arguments->learning);

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <stdexcept>
 
+#include "llmt/boosted_explain.hpp"
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/model.hpp"
@@ -35,9 +37,27 @@ void warn_if_not_finite(const ExplainArguments& arguments, const char* what, con
   }
 }
 
-void explain_table(const ExplainArguments& arguments, const Model& model, const Eigen::MatrixXd& inputs) {
-  report::TableExplanation explanation{arguments.model, arguments.data, inputs.rows(),
-                                       importance(model, inputs, arguments.threads)};
+// What trees and sums of trees are explained from.
+constexpr Eigen::Index most_background = 100;
+
+std::string mean_over(Eigen::Index rows) { return fmt::format("on average over {} rows of the table", rows); }
+
+Eigen::Index rows_of_importance(const Model& /*model*/, const Eigen::MatrixXd& inputs, std::string& /*beginning*/) {
+  return std::min(inputs.rows(), importance_rows);
+}
+
+Eigen::Index rows_of_importance(const BoostedModel& /*model*/, const Eigen::MatrixXd& inputs, std::string& beginning) {
+  beginning = mean_over(std::min(inputs.rows(), boosted_importance_background));
+  return std::min(inputs.rows(), boosted_importance_rows);
+}
+
+template <class AnyModel>
+void explain_table(const ExplainArguments& arguments, const AnyModel& model, const Eigen::MatrixXd& inputs) {
+  report::TableExplanation explanation{.model = arguments.model,
+                                       .data = arguments.data,
+                                       .rows = inputs.rows(),
+                                       .shares = importance(model, inputs, arguments.threads)};
+  explanation.rows_used = rows_of_importance(model, inputs, explanation.beginning);
   warn_if_not_finite(arguments, "importances", explanation.shares);
   if (arguments.json) {
     print_json(report::explanation_json(model, explanation));
@@ -47,7 +67,21 @@ void explain_table(const ExplainArguments& arguments, const Model& model, const 
   print(report::explanation_text(model, explanation, output_width()));
 }
 
-void explain_row(const ExplainArguments& arguments, const Model& model, const Csv& csv, const Eigen::MatrixXd& inputs) {
+Attribution attribution_of(const Model& model, const Eigen::VectorXd& point, const Eigen::MatrixXd& /*inputs*/,
+                           std::string& /*beginning*/) {
+  return attribute(model, point);
+}
+
+Attribution attribution_of(const BoostedModel& model, const Eigen::VectorXd& point, const Eigen::MatrixXd& inputs,
+                           std::string& beginning) {
+  const Eigen::MatrixXd background = background_of(inputs, most_background);
+  beginning = mean_over(background.rows());
+  return attribute(model, point, background);
+}
+
+template <class AnyModel>
+void explain_row(const ExplainArguments& arguments, const AnyModel& model, const Csv& csv,
+                 const Eigen::MatrixXd& inputs) {
   if (arguments.row > inputs.rows()) {
     throw std::invalid_argument(
         fmt::format("--row is {}, {} has {} rows", arguments.row, table_name(arguments.data), inputs.rows()));
@@ -58,7 +92,7 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Cs
                                      csv.line_of(arguments.row - 1),
                                      inputs.row(arguments.row - 1),
                                      {}};
-  explanation.attribution = attribute(model, explanation.inputs);
+  explanation.attribution = attribution_of(model, explanation.inputs, inputs, explanation.beginning);
   warn_if_not_finite(arguments, "contributions", explanation.attribution.contributions);
   if (arguments.json) {
     print_json(report::explanation_json(model, explanation));
@@ -68,9 +102,8 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Cs
   print(report::explanation_text(model, explanation, output_width()));
 }
 
-void explain_command(const ExplainArguments& arguments) {
-  const Model model = read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
-                                            [](const std::string& path) { return load_model(path); });
+template <class AnyModel>
+void explain(const ExplainArguments& arguments, const AnyModel& model) {
   const Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
@@ -83,6 +116,15 @@ void explain_command(const ExplainArguments& arguments) {
   }
 }
 
+void explain_command(const ExplainArguments& arguments) {
+  if (is_boosted_file(arguments.model)) {
+    explain(arguments, load_boosted(arguments.model));
+    return;
+  }
+  explain(arguments, read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
+                                           [](const std::string& path) { return load_model(path); }));
+}
+
 }  // namespace
 
 void add_explain(CLI::App& app) {
@@ -90,7 +132,7 @@ void add_explain(CLI::App& app) {
       "explain",
       "Say which inputs a model's predictions come from\n"
       "Over a table: the importance of each input. For one row of it: how far each input moves the prediction away "
-      "from the one at the means of the inputs.");
+      "from the one at the means of the inputs; of a sum of trees, away from the mean prediction of the table.");
   command->footer("Example: llmt explain concrete.json concrete.csv --row 3");
   const auto arguments = std::make_shared<ExplainArguments>();
   add_input_file(*command, "model", arguments->model, "Model file of llmt fit")->required();

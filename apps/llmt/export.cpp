@@ -4,6 +4,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "llmt/boosted_model.hpp"
 #include "llmt/c_source.hpp"
 #include "llmt/commands.hpp"
 #include "llmt/files.hpp"
@@ -21,20 +22,31 @@ struct ExportArguments {
   bool c = false;
 };
 
+template <class AnyModel>
+void write_source(const ExportArguments& arguments, const AnyModel& model, const CSource& c,
+                  const std::string& header) {
+  const std::vector<NewFile> files = {{arguments.output, c.source}, {header, c.header}};
+  write_files(files);
+  print(fmt::format("{}: {} inputs, {} outputs; written to {} and {}\n", arguments.model, model.num_inputs(),
+                    model.num_outputs(), arguments.output, header));
+}
+
 void export_command(const ExportArguments& arguments) {
   if (!arguments.c) throw std::invalid_argument("--c is the only language there is, and must be given");
   if (!is_c_identifier(arguments.name)) {
     throw std::invalid_argument(fmt::format("--name: \"{}\" must be an identifier of C of at most 31 characters",
                                             without_controls(arguments.name)));
   }
-  const Model model = load_model(arguments.model);
   const std::string header = beside(arguments.output, ".h").string();
   if (header == arguments.output) throw std::invalid_argument("--output: the header has this name; write to FILE.c");
-  const CSource c = to_c(model, arguments.name, std::filesystem::path(header).filename().string());
-  const std::vector<NewFile> files = {{arguments.output, c.source}, {header, c.header}};
-  write_files(files);
-  print(fmt::format("{}: {} inputs, {} outputs; written to {} and {}\n", arguments.model, model.num_inputs(),
-                    model.num_outputs(), arguments.output, header));
+  const std::string include = std::filesystem::path(header).filename().string();
+  if (is_boosted_file(arguments.model)) {
+    const BoostedModel model = load_boosted(arguments.model);
+    write_source(arguments, model, to_c(model, arguments.name, include), header);
+    return;
+  }
+  const Model model = load_model(arguments.model);
+  write_source(arguments, model, to_c(model, arguments.name, include), header);
 }
 
 }  // namespace

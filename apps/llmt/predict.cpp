@@ -73,11 +73,25 @@ void add_errors(const PredictArguments& arguments, const Csv& csv, report::Predi
   }
 }
 
+// The file's fault, not the caller's: no residuals, or too few for the level.
+Bounds bounds_of(const PredictArguments& arguments, const BoostedModel& model, const Eigen::MatrixXd& values) {
+  if (!model.has_intervals()) {
+    throw std::runtime_error(fmt::format("{}: the file has no held-out residuals; fit again", arguments.model));
+  }
+  try {
+    const Eigen::RowVectorXd widths = model.half_widths(arguments.interval).transpose();
+    return {values.rowwise() - widths, values.rowwise() + widths};
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
+  }
+}
+
 report::Prediction predict_table(const PredictArguments& arguments, const BoostedModel& model, const Csv& csv) {
   const report::ModelInputs inputs = report::read_inputs(csv, model, arguments.threads);
   report::Prediction predicted = predict_values(arguments, model, inputs);
   predicted.has_leverage = false;
   for (const double distance : distance_outside(model, inputs.values)) predicted.extrapolation.push_back({distance});
+  if (arguments.interval > 0.0) predicted.bounds = bounds_of(arguments, model, predicted.values);
   add_errors(arguments, csv, predicted);
   return predicted;
 }
@@ -216,10 +230,6 @@ report::Prediction predict_file(const PredictArguments& arguments, std::optional
     if (csv->rows() == 0) throw std::runtime_error(fmt::format("{}: there is a header and no rows", csv->name()));
   };
   if (is_boosted_file(arguments.model)) {
-    if (arguments.interval > 0.0) {
-      throw std::runtime_error(
-          fmt::format("{}: --interval is not for a boosted model; fit without --boost for intervals", arguments.model));
-    }
     const BoostedModel model = load_boosted(arguments.model);
     read();
     return predict_table(arguments, model, *csv);

@@ -53,6 +53,7 @@ TEST(BoostProgram, FitsAndPredictsAsTheLibrary) {
 TEST(BoostProgram, RefusesByNameWhatIsForOneTree) {
   const Folder folder;
   folder.write("d.csv", kinked_with_colours(60));
+  folder.write("one.csv", "a,y\n1,2\n");
   ASSERT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json").exit_code, 0);
   const auto refused = [&](const std::string& command, const std::string& words) {
     const Outcome outcome = folder.run(LLMT_PROGRAM " " + command);
@@ -62,10 +63,92 @@ TEST(BoostProgram, RefusesByNameWhatIsForOneTree) {
   refused("fit d.csv -t y --boost --monotone a", "--monotone is not for --boost");
   refused("fit d.csv -t y --boost --readable", "--readable is not for --boost");
   refused("fit d.csv -t y --boost --stream", "--boost is not for --stream");
-  refused("predict m.json d.csv --interval 0.9", "--interval is not for a boosted model");
-  for (const char* command : {"inspect m.json", "explain m.json d.csv", "export --c m.json -o m.c"}) {
-    refused(command, "m.json: a boosted model, the sum of many trees; one tree is needed here");
-  }
+  refused("fit one.csv -t y --boost",
+          "one.csv: 1 row; --boost needs at least 10 that differ, llmt fit without --boost takes fewer");
+  refused("inspect m.json --rules", "m.json: --rules is not for a sum of trees");
+  refused("predict m.json d.csv --interval 0.999", "held-out residuals of \"y\" are too few for the level 0.999");
+}
+
+TEST(BoostProgram, PredictsIntervals) {
+  const Folder folder;
+  folder.write("d.csv", kinked_with_colours(300));
+  ASSERT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json").exit_code, 0);
+  const Outcome predicted = folder.run(LLMT_PROGRAM " predict m.json d.csv --interval 0.9");
+  ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
+  const llmt::Csv answer = llmt::Csv::parse(predicted.out, "answer");
+  const double width = llmt::load_boosted(folder.file("m.json")).half_widths(0.9)(0);
+  EXPECT_EQ(answer.numbers("y_low"), (answer.numbers("y_pred").array() - width).matrix());
+  EXPECT_EQ(answer.numbers("y_high"), (answer.numbers("y_pred").array() + width).matrix());
+}
+
+TEST(BoostProgram, InspectsASum) {
+  const Folder folder;
+  folder.write("d.csv", kinked_with_colours(100));
+  ASSERT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json").exit_code, 0);
+  const llmt::BoostedModel model = llmt::load_boosted(folder.file("m.json"));
+  const llmt::BoostedSize size = size_of(model);
+  const Outcome shown = folder.run(LLMT_PROGRAM " inspect m.json");
+  ASSERT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_NE(shown.out.find(fmt::format("times the sum of {} trees with {} leaves", size.trees, size.leaves)),
+            std::string::npos)
+      << shown.out;
+  const json all = json::parse(folder.run(LLMT_PROGRAM " inspect m.json --json").out);
+  EXPECT_EQ(all["parameters"], size.parameters);
+  EXPECT_EQ(all["sums"][0]["splits"], size.leaves - size.trees);
+}
+
+TEST(BoostProgram, ExplainsRowsAndTables) {
+  const Folder folder;
+  folder.write("d.csv", kinked_with_colours(150));
+  ASSERT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json").exit_code, 0);
+  const Outcome of_row = folder.run(LLMT_PROGRAM " explain m.json d.csv --row 2 --json");
+  ASSERT_EQ(of_row.exit_code, 0) << of_row.err;
+  const json target = json::parse(of_row.out)["targets"][0];
+  double sum = target["reference"];
+  for (const json& entry : target["contributions"]) sum += entry["contribution"].get<double>();
+  EXPECT_NEAR(sum, target["prediction"].get<double>(), 1e-12);
+  const Outcome text = folder.run(LLMT_PROGRAM " explain m.json d.csv --row 2");
+  EXPECT_NE(text.out.find("on average over 100 rows of the table"), std::string::npos) << text.out;
+  const json table = json::parse(folder.run(LLMT_PROGRAM " explain m.json d.csv --json").out);
+  EXPECT_EQ(table["rows_used"], 150);
+  double shares = 0.0;
+  for (const json& entry : table["targets"][0]["importance"]) shares += entry["importance"].get<double>();
+  EXPECT_NEAR(shares, 1.0, 1e-12);
+}
+
+TEST(BoostProgram, IsComparedWithOneTree) {
+  const Folder folder;
+  folder.write("d.csv", kinked_with_colours(120));
+  folder.write("few.csv", kinked_with_colours(30));
+  const Outcome compared = folder.run(LLMT_PROGRAM " compare d.csv -t y --cv 2 --json");
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  const json sum = json::parse(compared.out)["methods"].back();
+  EXPECT_EQ(sum["method"], "sum of trees");
+  EXPECT_GT(sum["trees"], 1);
+  EXPECT_GT(sum["parameters"], sum["leaves"]);
+  EXPECT_TRUE(sum["largest_jump"].is_null());
+  EXPECT_LT(sum["cv_rmse"], 0.5);
+  const Outcome text = folder.run(LLMT_PROGRAM " compare d.csv -t y --cv 2");
+  EXPECT_NE(text.out.find("One tree ("), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find(", sum of trees "), std::string::npos) << text.out;
+  const Outcome few = folder.run(LLMT_PROGRAM " compare few.csv -t y --cv 2");
+  EXPECT_NE(few.out.find("A sum of trees (--boost) is not compared: fewer than 40 different rows."), std::string::npos)
+      << few.out;
+  std::string repeats = "a,y\n";  // of few inputs
+  for (int i = 0; i < 60; ++i) repeats += fmt::format("{},{}\n", i % 6, i);
+  folder.write("repeats.csv", repeats);
+  const Outcome of_repeats = folder.run(LLMT_PROGRAM " compare repeats.csv -t y --cv 2");
+  EXPECT_NE(of_repeats.out.find("is not compared: fewer than 10 groups of rows"), std::string::npos) << of_repeats.out;
+}
+
+TEST(BoostProgram, ExportsC) {
+  const Folder folder;
+  folder.write("d.csv", kinked_with_colours(60));
+  ASSERT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json").exit_code, 0);
+  const Outcome exported = folder.run(LLMT_PROGRAM " export --c m.json -o m.c --name sum");
+  ASSERT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_NE(llmt::read_file(folder.file("m.c")).find("int sum_predict(const double *inputs, double *outputs)"),
+            std::string::npos);
 }
 
 }  // namespace

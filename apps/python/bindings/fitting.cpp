@@ -19,6 +19,7 @@
 #include "python/bindings/interruptible.hpp"
 #include "python/bindings/module.hpp"
 #include "python/bindings/options.hpp"
+#include "python/bindings/rows.hpp"
 #include "report/document/page.hpp"
 #include "report/fit/fit_accuracy.hpp"
 #include "report/fit/fit_summary.hpp"
@@ -133,12 +134,7 @@ std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const 
                                std::vector<std::vector<std::string>> levels, const std::optional<Vector>& weights,
                                const std::optional<Vector>& groups, std::vector<Eigen::Index> held_out,
                                bool may_have_codes, std::optional<double> readable_loss, const nb::object& report) {
-  TrainingData data{.inputs = rows_of(inputs), .outputs = rows_of(outputs)};
-  if (weights) data.weights = vector_of(*weights);
-  if (groups) {
-    const Eigen::VectorXd labels = vector_of(*groups);
-    data.groups.assign(labels.begin(), labels.end());
-  }
+  TrainingData data = training_data_of(inputs, outputs, weights, groups);
   data.held_out = std::move(held_out);
   data.levels = std::move(levels);
   data.may_have_codes = may_have_codes;

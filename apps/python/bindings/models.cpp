@@ -5,7 +5,6 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
-#include <functional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -15,7 +14,7 @@
 #include "llmt/intervals.hpp"
 #include "llmt/model.hpp"
 #include "python/bindings/arrays.hpp"
-#include "python/bindings/interruptible.hpp"
+#include "python/bindings/model_arrays.hpp"
 #include "python/bindings/module.hpp"
 #include "report/model/leaves.hpp"
 #include "report/model/rules.hpp"
@@ -23,44 +22,12 @@
 namespace llmt::python {
 namespace {
 
-// Rows that are predicted, judged or explained at a time; signals are looked for in between. By models of 60 leaves a
-// row is predicted in about 1 us, its interval found in 10 us, and explained in 3 ms, so that a block takes 30 ms or
-// less, and less than a second on a busy machine.
-constexpr Eigen::Index predicted_rows = 10000;
+// Rows whose intervals are found, or that are explained, at a time, as predicted_rows: by models of 60 leaves an
+// interval is found in 10 us, and a row is explained in 3 ms.
 constexpr Eigen::Index judged_rows = 1000;
 constexpr Eigen::Index explained_rows = 5;
 
-// Calls `use(first, block)` for blocks of rows, without the interpreter's lock.
-void for_blocks(const Array& inputs, Eigen::Index rows_at_a_time,
-                const std::function<void(Eigen::Index first, const Eigen::MatrixXd& block)>& use) {
-  const Rows rows = rows_of(inputs);
-  Eigen::Index first = 0;
-  do {
-    const Eigen::Index count = std::min(rows_at_a_time, rows.rows() - first);
-    {
-      const nb::gil_scoped_release unlocked;
-      use(first, rows.middleRows(first, count));
-    }
-    check_signals();
-    first += count;
-  } while (first < rows.rows());
-}
-
-template <class Scalar>
-using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
-
-// The blocks' results below each other.
-template <class Scalar>
-nb::ndarray<nb::numpy, Scalar, nb::ndim<2>> stacked(
-    const Array& inputs, Eigen::Index columns, const std::function<Matrix<Scalar>(const Eigen::MatrixXd& block)>& of) {
-  Matrix<Scalar> result(static_cast<Eigen::Index>(inputs.shape(0)), columns);
-  for_blocks(inputs, predicted_rows, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
-    result.middleRows(first, block.rows()) = of(block);
-  });
-  return array_of<Scalar>(std::move(result));
-}
-
-auto predict(const ModelWithIntervals& self, const Array& inputs, int threads) {
+auto predict_by_tree(const ModelWithIntervals& self, const Array& inputs, int threads) {
   return stacked<double>(inputs, self.model.num_outputs(),
                          [&](const Eigen::MatrixXd& block) { return self.model.predict(block, threads); });
 }
@@ -120,10 +87,9 @@ auto attribute_rows(const ModelWithIntervals& self, const Array& inputs) {
         contributions[o].row(first + row) = found.contributions.row(o);
     }
   });
-  std::vector<nb::ndarray<nb::numpy, double, nb::ndim<2>>> arrays;
-  for (Eigen::MatrixXd& matrix : contributions) arrays.push_back(array_of<double>(std::move(matrix)));
   const Eigen::MatrixXd base = model.predict(reference.transpose());
-  return std::make_tuple(arrays, std::vector<double>(base.reshaped().begin(), base.reshaped().end()));
+  return std::make_tuple(arrays_of(std::move(contributions)),
+                         std::vector<double>(base.reshaped().begin(), base.reshaped().end()));
 }
 
 auto importance_of(const ModelWithIntervals& self, const Array& inputs, int threads) {
@@ -141,27 +107,6 @@ std::tuple<std::string, std::string> c_source(const ModelWithIntervals& self, co
   return {std::move(written.source), std::move(written.header)};
 }
 
-nb::typed<nb::list, nb::typed<nb::dict, nb::str, nb::any>> columns_of(const Model& model) {
-  nb::typed<nb::list, nb::typed<nb::dict, nb::str, nb::any>> columns;
-  for (const InputColumn& input : model.inputs()) {
-    nb::dict column;
-    column["name"] = input.name;
-    column["low"] = input.low;
-    column["high"] = input.high;
-    column["centre"] = input.centre;
-    column["levels"] = input.levels;
-    column["codes"] = input.codes;
-    columns.append(column);
-  }
-  return columns;
-}
-
-std::vector<std::string> targets_of(const Model& model) {
-  std::vector<std::string> names;
-  for (const OutputColumn& output : model.outputs()) names.push_back(output.name);
-  return names;
-}
-
 }  // namespace
 
 void add_models(nb::module_& module) {
@@ -173,10 +118,10 @@ void add_models(nb::module_& module) {
       .def("to_json", [](const Self& self) { return to_json(self.model, self.intervals); })
       .def("without_intervals", [](const Self& self) { return to_json(self.model); })
       .def_prop_ro("has_intervals", [](const Self& self) { return !self.intervals.empty(); })
-      .def("inputs", [](const Self& self) { return columns_of(self.model); })
-      .def("outputs", [](const Self& self) { return targets_of(self.model); })
+      .def("inputs", [](const Self& self) { return columns_of(self.model.inputs()); })
+      .def("outputs", [](const Self& self) { return targets_of(self.model.outputs()); })
       .def("used_inputs", [](const Self& self) { return used_inputs(self.model); })
-      .def("predict", &predict, nb::arg("inputs"), nb::arg("threads") = 0)
+      .def("predict", &predict_by_tree, nb::arg("inputs"), nb::arg("threads") = 0)
       .def("standard_errors", &standard_errors, nb::arg("inputs"), nb::arg("threads") = 0)
       .def("leaf_of", &leaf_of, nb::arg("inputs"), nb::arg("threads") = 0)
       .def("validities", &validities, nb::arg("inputs"), nb::arg("partition"), nb::arg("threads") = 0)

@@ -30,6 +30,7 @@ NB_MODULE(_core, module) {
       nanobind::arg("path"), nanobind::arg("content"));
   llmt::python::add_arrow(module);
   llmt::python::add_models(module);
+  llmt::python::add_boosted(module);
   llmt::python::add_distributed(module);
   llmt::python::add_fitting(module);
   llmt::python::add_found(module);

@@ -98,4 +98,14 @@ StreamOptions stream_options_of(const nb::dict& given) {
   return options;
 }
 
+BoostOptions boost_options_of(const nb::dict& given) {
+  BoostOptions options;
+  apply(given, {{"rate", number(options.rate)},
+                {"max_rounds", number(options.max_rounds)},
+                {"mean_of_few", number(options.mean_of_few)},
+                {"seed", number(options.seed)},
+                {"max_threads", number(options.max_threads)}});
+  return options;
+}
+
 }  // namespace llmt::python

@@ -4,6 +4,7 @@
 
 #include <nanobind/nanobind.h>
 
+#include "llmt/boosted.hpp"
 #include "llmt/options.hpp"
 #include "llmt/stream_options.hpp"
 
@@ -21,5 +22,8 @@ FitOptions options_of(const nb::dict& given);
 
 /// The same of StreamOptions.
 StreamOptions stream_options_of(const nb::dict& given);
+
+/// The same of BoostOptions.
+BoostOptions boost_options_of(const nb::dict& given);
 
 }  // namespace llmt::python

@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ._boosted import BoostedLocalLinearTreeRegressor as BoostedLocalLinearTreeRegressor
     from ._discover import Missing as Missing
     from ._discover import Parameter as Parameter
     from ._discover import discover as discover
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from ._found import Found as Found
     from ._found import load_found as load_found
     from ._estimator import LocalLinearTreeRegressor as LocalLinearTreeRegressor
+    from ._load import load as load
+    from ._model import BoostedModel as BoostedModel
     from ._model import Model as Model
     from ._signals import Signals as Signals
     from ._signals import signals as signals
@@ -31,6 +34,8 @@ if TYPE_CHECKING:
 
 # Where each public name is defined; the module is imported when the name is asked for.
 _homes = {
+    "BoostedLocalLinearTreeRegressor": "_boosted",
+    "BoostedModel": "_model",
     "Found": "_found",
     "LocalLinearTreeRegressor": "_estimator",
     "Missing": "_discover",
@@ -40,11 +45,14 @@ _homes = {
     "__version__": "_core",
     "discover": "_discover",
     "find_missing": "_discover",
+    "load": "_load",
     "load_found": "_found",
     "signals": "_signals",
 }
 
 __all__ = [
+    "BoostedLocalLinearTreeRegressor",
+    "BoostedModel",
     "Found",
     "LocalLinearTreeRegressor",
     "Missing",
@@ -54,6 +62,7 @@ __all__ = [
     "__version__",
     "discover",
     "find_missing",
+    "load",
     "load_found",
     "signals",
 ]

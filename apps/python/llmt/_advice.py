@@ -67,14 +67,14 @@ def _places(rows: list[int], target: np.ndarray) -> str:
     return f"row{'' if len(rows) == 1 else 's'} {named}"
 
 
-def check_targets(outputs: np.ndarray, names: list[str], robust: bool, stacklevel: int) -> None:
+def check_targets(outputs: np.ndarray, names: list[str], robust: str, stacklevel: int) -> None:
     """Warns of a constant target and of few rows that decide a fit by squares. Raises ValueError for a value beside
-    which all others are rounding errors."""
+    which all others are rounding errors. `robust`: how a fit that is robust is asked for; empty: this one is."""
     for column, name in enumerate(names):
         target = outputs[:, column]
         if len(target) > 1 and target.min() == target.max():
             warnings.warn(f'target "{name}" is {target[0]:g} in every row: the model is that constant', stacklevel=stacklevel)
-        if robust:
+        if not robust:
             continue
         rows, share, hide_the_others = _core.dominant_rows(np.ascontiguousarray(target))
         if not rows:
@@ -82,10 +82,10 @@ def check_targets(outputs: np.ndarray, names: list[str], robust: bool, stackleve
         if hide_the_others:
             raise ValueError(
                 f'target "{name}", row {rows[0]}: {target[rows[0]]:.6g} is so large that the differences between all '
-                'other values are below its rounding error; correct it, leave the row out, or use loss="tukey"'
+                f"other values are below its rounding error; correct it, leave the row out, or use {robust}"
             )
         warnings.warn(
             f'{len(rows)} of {len(target)} rows carry {100 * share:.3g} % of the squares of "{name}" about its median: '
-            f'{_places(rows, target)}. If they are mistakes, correct them or use loss="tukey"',
+            f"{_places(rows, target)}. If they are mistakes, correct them or use {robust}",
             stacklevel=stacklevel,
         )

@@ -75,9 +75,7 @@ def check(estimator: Any, X: Any, y: Any = None) -> Check:
             raise ValueError(f"y has the shape {observed.shape}, the predictions have {predicted.shape}")
         errors = np.sqrt(np.mean((predicted - observed).reshape(len(observed), -1) ** 2, axis=0))
         rmse = dict(zip(estimator._outputs, map(float, errors), strict=True))
-        for partition in estimator.summary_.get("partitions", []):
-            if len(partition["targets"]) == 1 and partition["cv_rmse"] is not None:
-                held_out[partition["targets"][0]] = partition["cv_rmse"]
+        held_out = estimator._held_out_rmse()
     return Check(len(table.values), np.flatnonzero(distance > 0), columns, rmse, held_out)
 
 

@@ -15,10 +15,14 @@ from ._tree import level_names, number, shown
 class Explanation:
     """How the inputs move each prediction away from a base value.
 
-    For every row and target, `base_values + values.sum(over the inputs) = prediction`. The values are those of the
-    Aumann-Shapley rule along the straight line from the point where every number has its mean and every category is
-    missing (integrated gradients; docs/algorithms/explanation.md): contributions of a path, not the expectations over
+    For every row and target, `base_values + values.sum(over the inputs) = prediction` (docs/algorithms/explanation.md).
+
+    Of one tree the values are those of the Aumann-Shapley rule along the straight line from the point where every number
+    has its mean and every category is missing (integrated gradients): contributions of a path, not the expectations over
     the training rows that tree SHAP computes. In an affine model they are slope times the distance from the mean.
+
+    Of a sum of trees they are Shapley values against rows of a background (interventional SHAP), and the base value is
+    the mean prediction of these rows.
 
     The attributes have the names and shapes of `shap.Explanation`, and where shap has been imported the plots of shap
     take this object as theirs.
@@ -196,10 +200,11 @@ class Explanation:
         return rows, _position(inputs, self._names()), _position(outputs, self.output_names)
 
 
-def explanation_of(handle: Any, inputs: np.ndarray) -> Explanation:
-    """The contributions for rows of inputs (categories as positions of their levels, or codes) to a `_core.Model`."""
+def explanation_of(handle: Any, inputs: np.ndarray, *more: Any) -> Explanation:
+    """The contributions for rows of inputs (categories as positions of their levels, or codes) to a `_core.Model`, or,
+    with the background and the number of threads, to a `_core.BoostedModel`."""
     columns, names = handle.inputs(), handle.outputs()
-    contributions, base = handle.attribute(inputs)
+    contributions, base = handle.attribute(inputs, *more)
     rows = len(inputs)
     values = contributions[0] if len(names) == 1 else np.stack(contributions, axis=2)
     base_values = np.full(rows, base[0]) if len(names) == 1 else np.tile(base, (rows, 1))

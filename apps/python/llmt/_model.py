@@ -2,17 +2,18 @@
 
 import json
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from . import _core
 from ._files import write_text
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
-class Model:
-    """A fitted model: a tree with a linear equation in every leaf, and the intervals that were made with it.
 
-    Its whole state is the JSON text that `llmt fit -o` writes and `llmt predict` reads, so that it can be pickled,
-    copied and sent to other processes.
+class TextModel:
+    """A fitted model whose whole state is the JSON text that `llmt fit -o` writes and `llmt predict` reads, so that it can
+    be pickled, copied and sent to other processes.
 
     Parameters
     ----------
@@ -22,12 +23,14 @@ class Model:
     Raises
     ------
     ValueError
-        If the text is no model; the message names the place in the text.
+        If the text is no such model; the message names the place in the text.
     """
+
+    _type: ClassVar[Any]
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._handle: _core.Model | None = _core.Model(text)
+        self._handle: Any = self._type(text)
 
     def __getstate__(self) -> dict[str, str]:
         return {"text": self._text}
@@ -37,19 +40,19 @@ class Model:
         self._handle = None
 
     @property
-    def handle(self) -> _core.Model:
+    def handle(self) -> Any:
         """The C++ object; made from the text when it is asked for."""
         if self._handle is None:
-            self._handle = _core.Model(self._text)
+            self._handle = self._type(self._text)
         return self._handle
 
-    def to_json(self, intervals: bool = True) -> str:
-        """The model as JSON text; `intervals`: with what prediction intervals need."""
-        return self._text if intervals else self.handle.without_intervals()
+    def to_json(self) -> str:
+        """The model as JSON text."""
+        return self._text
 
     def to_dict(self) -> dict[str, Any]:
-        """The members of the JSON text, without those of the intervals."""
-        parsed: dict[str, Any] = json.loads(self.to_json(intervals=False))
+        """The members of the JSON text."""
+        parsed: dict[str, Any] = json.loads(self._text)
         return parsed
 
     def save(self, path: "str | os.PathLike[str]") -> None:
@@ -57,7 +60,7 @@ class Model:
         write_text(path, self._text)
 
     @classmethod
-    def load(cls, path: "str | os.PathLike[str]") -> "Model":
+    def load(cls, path: "str | os.PathLike[str]") -> "Self":
         """Reads a model file."""
         with open(path, encoding="utf-8") as file:
             text = file.read()
@@ -68,7 +71,29 @@ class Model:
 
     def __repr__(self) -> str:
         inputs = [column["name"] for column in self.handle.inputs()]
-        return f"<llmt.Model {', '.join(self.handle.outputs())} from {', '.join(inputs)}>"
+        return f"<llmt.{type(self).__name__} {', '.join(self.handle.outputs())} from {', '.join(inputs)}>"
+
+
+class Model(TextModel):
+    """A tree with a linear equation in every leaf, and the intervals that were made with it."""
+
+    _type = _core.Model
+
+    def to_json(self, intervals: bool = True) -> str:
+        """The model as JSON text; `intervals`: with what prediction intervals need."""
+        text: str = self._text if intervals else self.handle.without_intervals()
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """The members of the JSON text, without those of the intervals."""
+        parsed: dict[str, Any] = json.loads(self.to_json(intervals=False))
+        return parsed
+
+
+class BoostedModel(TextModel):
+    """A sum of many small trees for each target."""
+
+    _type = _core.BoostedModel
 
 
 class StreamModel:

@@ -144,4 +144,6 @@ def status(state: bytes) -> dict[str, Any]:
 
 def estimator(state: bytes) -> LocalLinearTreeRegressor:
     """The fitted estimator of a finished state, as `LocalLinearTreeRegressor.load` gives it."""
-    return LocalLinearTreeRegressor()._take_model(Model(_core.distributed_model(state)))
+    regressor = LocalLinearTreeRegressor()
+    regressor._take_model(Model(_core.distributed_model(state)))
+    return regressor

@@ -2,9 +2,31 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <vector>
 
 namespace llmt::report {
+namespace {
+
+// What one tree costs in error beside a sum of trees, and what either can be asked.
+std::string cost_of_reading(const std::vector<Comparison>& methods) {
+  const Comparison* sum = nullptr;
+  const Comparison* tree = nullptr;
+  for (const Comparison& method : methods) {
+    const Comparison*& best = method.is_sum ? sum : tree;
+    if (best == nullptr || method.cv_rmse < best->cv_rmse) best = &method;
+  }
+  if (sum == nullptr || tree == nullptr || !(sum->cv_rmse > 0.0)) return "";
+  const double cost = 100.0 * (tree->cv_rmse / sum->cv_rmse - 1.0);
+  const std::string verdict =
+      cost > 0.0 ? fmt::format("reading costs {:.1f} % more error", cost) : "reading costs nothing here";
+  return fmt::format(
+      "One tree ({}) {}, {} {}: {}. A tree has rules, equations, monotone inputs and derivatives; a sum has "
+      "predictions, contributions of the inputs and C.\n",
+      tree->method, number(tree->cv_rmse), sum->method, number(sum->cv_rmse), verdict);
+}
+
+}  // namespace
 
 Json comparison_json(const FitRun& run, const std::string& target, const ComparisonResult& result) {
   Json json;
@@ -15,12 +37,13 @@ Json comparison_json(const FitRun& run, const std::string& target, const Compari
   json["methods"] = Json::array();
   for (const Comparison& method : result.methods) {
     json["methods"].push_back({{"method", method.method},
+                               {"trees", method.trees},
                                {"leaves", method.leaves},
                                {"parameters", method.parameters},
                                {"cv_rmse", method.cv_rmse},
                                {"spread", method.spread},
                                {"fold_rmse", std::vector<double>(method.fold_rmse.begin(), method.fold_rmse.end())},
-                               {"largest_jump", method.largest_jump},
+                               {"largest_jump", finite_or_null(method.largest_jump)},
                                {"fit_seconds", method.fit_seconds},
                                {"predict_seconds_per_million_rows", method.predict_seconds}});
   }
@@ -49,11 +72,13 @@ std::string comparison_text(const FitRun& run, const std::string& target, const 
   Table table({"method", "leaves", "parameters", "RMSE held-out", "spread of folds", "largest jump", "fit, s",
                "predict 1e6 rows, s"});
   for (const Comparison& method : result.methods) {
+    const std::string jump = std::isnan(method.largest_jump) ? "-" : number(method.largest_jump, 3);
     table.add({method.method, fmt::format("{}", method.leaves), fmt::format("{}", method.parameters),
-               number(method.cv_rmse), number(method.spread, 2), number(method.largest_jump, 3),
-               number(method.fit_seconds, 2), number(method.predict_seconds, 2)});
+               number(method.cv_rmse), number(method.spread, 2), jump, number(method.fit_seconds, 2),
+               number(method.predict_seconds, 2)});
   }
-  return text + table.text(width) + "\n" + result.recommendation + "\n";
+  return text + table.text(width) + "\n" + result.recommendation + "\n" +
+         wrapped(cost_of_reading(result.methods), width);
 }
 
 }  // namespace llmt::report

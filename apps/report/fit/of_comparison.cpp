@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <functional>
 
 #include "report/document/figures.hpp"
@@ -75,7 +76,8 @@ Json methods_table(const Compared& of) {
             .wide = true};
   for (const Comparison& method : of.result.methods) {
     grid.rows.push_back({method.method, std::to_string(method.leaves), std::to_string(method.parameters),
-                         number(method.cv_rmse), number(method.spread, 2), number(method.largest_jump, 3),
+                         number(method.cv_rmse), number(method.spread, 2),
+                         std::isnan(method.largest_jump) ? "-" : number(method.largest_jump, 3),
                          number(method.fit_seconds, 2), number(method.predict_seconds, 2)});
   }
   return block(grid);

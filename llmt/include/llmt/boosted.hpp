@@ -19,12 +19,19 @@
 
 namespace llmt {
 
+/// Rows that differ, which fit_boosted() needs.
+inline constexpr Eigen::Index fewest_boosted_rows = 10;
+
+/// Levels of a categorical input that fit_boosted() takes.
+inline constexpr int most_boosted_levels = 50;
+
 struct BoostOptions {
   /// Factor on every tree. 0: 0.05 below 10 000 rows, else 0.07; 0.1 where the trees are soft.
   double rate = 0.0;
-  int max_rounds = 2000;   ///< trees of an output at most, before the sum is fitted to all rows
-  std::uint64_t seed = 1;  ///< of the rows that are held out, and of the features that a split looks at
-  int max_threads = 0;     ///< 0: all that the machine has. The result does not depend on it
+  int max_rounds = 2000;     ///< trees of an output at most, before the sum is fitted to all rows
+  std::uint64_t seed = 1;    ///< of the rows that are held out, and of the features that a split looks at
+  int max_threads = 0;       ///< 0: all that the machine has. The result does not depend on it
+  bool mean_of_few = false;  ///< of fewer than `fewest_boosted_rows` different rows: their mean, in place of an error
 };
 
 /// A variant of the trees, and its error on the held-out rows after the same few rounds as the others.
@@ -37,8 +44,8 @@ struct BoostVariant {
 struct BoostSummary {
   Eigen::Index rows = 0;               ///< that the sum is fitted to; equal rows count once
   Eigen::Index held_out = 0;           ///< rows that decided the variant and the number of trees
-  double rmse = 0.0;                   ///< on these, of the trees fitted without them, in the output's unit
-  std::string variant;                 ///< the one taken
+  double rmse = 0.0;                   ///< on these, of the trees fitted without them, in the output's unit; or NaN
+  std::string variant;                 ///< the one taken; "mean": no trees, see BoostOptions::mean_of_few
   std::vector<BoostVariant> compared;  ///< empty below 5000 rows: symmetric trees
   Eigen::Index trees = 0;
   double train_rmse = 0.0;
@@ -55,12 +62,14 @@ struct BoostResult {
 /// Then the sum is fitted to all rows with a quarter more trees. With TrainingData::held_out these rows decide instead,
 /// and the sum of the other rows is the result.
 ///
+/// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
+///
 /// Inputs may be missing (NaN). A category is taken as the indicators of its levels. Weights are as for fit(); a row of
 /// the weight k is k equal rows, to the byte. Up to the values of the seed, the result does not depend on the scale of
 /// outputs and inputs, nor on the number of threads, for which it is the same to the byte.
 ///
-/// Throws std::invalid_argument as fit(), for fewer than 10 different rows, and for a categorical input of more than 50
-/// levels.
+/// Throws std::invalid_argument as fit(), for fewer than `fewest_boosted_rows` different rows, and for a categorical
+/// input of more than `most_boosted_levels` levels.
 BoostResult fit_boosted(const TrainingData& data, const BoostOptions& options = {}, const Progress& progress = {});
 
 }  // namespace llmt

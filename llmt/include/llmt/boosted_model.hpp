@@ -61,6 +61,8 @@ struct BoostedSum {
   double rate = 1.0;
   std::vector<BoostedFeature> features;
   std::vector<BoostedTree> trees;
+  /// Absolute residuals of held-out rows under trees that were fitted without them, ascending; empty: there are none.
+  std::vector<double> residuals = {};
 };
 
 /// A sum of trees for each output: immutable, safe to use from many threads.
@@ -83,12 +85,30 @@ class BoostedModel {
   /// alone or among others.
   Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
+  /// Whether every sum has residuals.
+  bool has_intervals() const;
+
+  /// Of each output the half width of prediction intervals that hold the fraction `level` (0.9, for example) of the
+  /// outputs: the ceil(level (n + 1))-th smallest of the n residuals, as in split conformal prediction (Vovk et al.
+  /// 2005). It is the same for all rows, and about right on average: the trees of all rows are a little better than
+  /// those of the residuals, whose rows decided where these stopped. Throws std::invalid_argument if there are no
+  /// residuals, too few for the level, or if the level is not between 0 and 1.
+  Eigen::VectorXd half_widths(double level) const;
+
  private:
   std::vector<InputColumn> inputs_;
   std::vector<OutputColumn> outputs_;
   std::vector<double> deviations_;
   std::vector<BoostedSum> sums_;
 };
+
+/// How large a model is, over all outputs.
+struct BoostedSize {
+  Eigen::Index trees = 0;
+  Eigen::Index leaves = 0;
+  Eigen::Index parameters = 0;  ///< constants and slopes of leaves, thresholds and half widths of splits
+};
+BoostedSize size_of(const BoostedModel& model);
 
 /// Of each input of a model, whether a split or a leaf uses it.
 std::vector<bool> used_inputs(const BoostedModel& model);

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "llmt/abi.hpp"
+#include "llmt/boosted_model.hpp"
 #include "llmt/model.hpp"
 
 namespace llmt {
@@ -31,6 +32,11 @@ struct CSource {
 /// `name` begins all names; `header_name` is what the source includes. Throws std::invalid_argument if `name` is no
 /// identifier of C.
 CSource to_c(const Model& model, const std::string& name, const std::string& header_name);
+
+/// BoostedModel::predict() in the same way, with a function of the same kind and the same bytes. A sum of hundreds of
+/// trees has tables of megabytes: about 100 bytes of text, and 60 of constants in the program, for a leaf and its
+/// split.
+CSource to_c(const BoostedModel& model, const std::string& name, const std::string& header_name);
 
 /// Whether a text is an identifier of C of at most 31 characters, and no keyword.
 bool is_c_identifier(std::string_view text);

@@ -6,10 +6,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/boosted.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/progress.hpp"
 
@@ -18,7 +20,8 @@ namespace llmt {
 /// A way to learn, with a name for people.
 struct Method {
   std::string name;
-  FitOptions options;
+  FitOptions options;                        ///< of one tree
+  std::optional<BoostOptions> boosted = {};  ///< a sum of trees in its place: fit_boosted()
 };
 
 /// The methods of `llmt compare`: least squares; the crisp tree of each growth rule that has one (RD, RETIS, RA, M5');
@@ -31,16 +34,25 @@ std::vector<Method> usual_methods(const FitOptions& base = {});
 /// as fit() for names and categories.
 std::vector<Method> usual_methods(const FitOptions& base, const TrainingData& data);
 
+/// "sum of trees", by the seed and the threads of `base`.
+Method boosted_method(const FitOptions& base = {});
+
+/// Why the sum of trees is not among the methods for these rows: "--loss tukey", ...; empty: it is.
+std::string why_not_boosted(const FitOptions& base, const TrainingData& data);
+
 /// What one method made of the data.
 struct Comparison {
   std::string method;
-  Eigen::Index leaves = 0;  ///< of the model of all rows
+  bool is_sum = false;      ///< of trees, not one tree
+  Eigen::Index trees = 1;   ///< of the model of all rows
+  Eigen::Index leaves = 0;  ///< of all trees
   /// Number of constants and non-zero slopes of the local models, thresholds, directions and gates of the splits.
   Eigen::Index parameters = 0;
   Eigen::VectorXd fold_rmse = {};  ///< held-out, one entry a fold
   double cv_rmse = 0.0;            ///< over all held-out rows
   double spread = 0.0;             ///< standard deviation of fold_rmse
-  /// Largest change of the prediction across a split, at the training rows' projections on it (at most 1000 rows).
+  /// Largest change of the prediction across a split, at the training rows' projections on it (at most 1000 rows). NaN
+  /// of a sum of trees.
   double largest_jump = 0.0;
   double fit_seconds = 0.0;      ///< of the model of all rows, its own selection included
   double predict_seconds = 0.0;  ///< time to predict a million rows

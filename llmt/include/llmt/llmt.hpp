@@ -7,6 +7,7 @@
 
 #include "llmt/arrow.hpp"
 #include "llmt/boosted.hpp"
+#include "llmt/boosted_explain.hpp"
 #include "llmt/boosted_model.hpp"
 #include "llmt/c_source.hpp"
 #include "llmt/compare.hpp"

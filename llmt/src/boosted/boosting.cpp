@@ -35,7 +35,10 @@ Rounds boost(const BinnedRows& rows, const Eigen::VectorXd& output, const std::v
   TreeGrower grower(rows, train, options.tree, options.max_threads);
   double best = std::numeric_limits<double>::infinity();
   int best_round = 0;
-  if (!held_out.empty()) best = rmse_of(residuals, rows.weights, held_out);
+  if (!held_out.empty()) {
+    best = rmse_of(residuals, rows.weights, held_out);
+    result.residuals = residuals(held_out);
+  }
   for (int round = 1; round <= options.most_rounds; ++round) {
     work.did(1.0 / options.most_rounds);
     result.trees.push_back(round <= std::ssize(structures) ? grower.estimate(structures[round - 1], residuals)
@@ -53,6 +56,7 @@ Rounds boost(const BinnedRows& rows, const Eigen::VectorXd& output, const std::v
     if (error < best * (1.0 - 1e-9)) {
       best = error;
       best_round = round;
+      result.residuals = residuals(held_out);
     }
     if (round - best_round >= options.patience) break;
   }

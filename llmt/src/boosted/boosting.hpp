@@ -22,8 +22,9 @@ struct RoundOptions {
 struct Rounds {
   double base = 0.0;
   std::vector<GrowingTree> trees;
-  double rmse = 0.0;        ///< on the held-out rows, of these trees; NaN without such rows
-  double train_rmse = 0.0;  ///< on the others; with held-out rows, after the last round that was tried
+  double rmse = 0.0;               ///< on the held-out rows, of these trees; NaN without such rows
+  Eigen::VectorXd residuals = {};  ///< of the held-out rows, of these trees
+  double train_rmse = 0.0;         ///< on the others; with held-out rows, after the last round that was tried
 };
 
 /// Boosts on the rows `train` until the error on `held_out` has not become smaller for `patience` rounds, and keeps the

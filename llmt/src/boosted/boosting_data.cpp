@@ -20,8 +20,6 @@
 namespace llmt {
 namespace {
 
-constexpr Eigen::Index fewest_rows = 10;
-constexpr int most_levels = 50;
 constexpr double largest_extent = 1e100;  // sums of two standardised inputs stay finite
 
 // Below this number of rows one hold-out decides by chance: five of them decide together.
@@ -160,11 +158,11 @@ InputColumn describe(const TrainingData& data, const GivenRows& given, const Boo
   column.centre = std::clamp(sum / weight, column.low, column.high);
   if (std::ranges::count(given.categorical, input) > 0) {
     const auto levels = static_cast<int>(column.high) + 1;
-    if (levels > most_levels) {
+    if (levels > most_boosted_levels) {
       throw std::invalid_argument(
           fmt::format("llmt::fit_boosted: input \"{}\" has {} levels, boosting takes at most {}; leave it out, or put "
                       "rare levels together",
-                      column.name, levels, most_levels));
+                      column.name, levels, most_boosted_levels));
     }
     for (int level = 0; level < levels; ++level) {
       const bool has_name = !data.levels.empty() && !data.levels[input].empty();
@@ -217,10 +215,11 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
   const std::vector<Eigen::Index> rows = weighted_rows(given);
   const RowNumbers numbers = number_rows(given.inputs.values, given.outputs.values, rows, options.max_threads);
   const DifferentRows different = different_rows(given, numbers, rows);
-  if (std::ssize(different.first) < fewest_rows) {
+  const bool few = std::ssize(different.first) < fewest_boosted_rows;
+  if (few && !options.mean_of_few) {
     throw std::invalid_argument(
-        fmt::format("llmt::fit_boosted: there are {} different rows, at least {} are needed; fit() takes fewer",
-                    different.first.size(), fewest_rows));
+        fmt::format("llmt::fit_boosted: different rows: {}; a sum of trees needs at least {}, one tree takes fewer",
+                    different.first.size(), fewest_boosted_rows));
   }
   if (std::ssize(different.first) > most_boosted_rows) {
     throw std::invalid_argument(fmt::format("llmt::fit_boosted: there are {} different rows, at most {} are taken",
@@ -232,6 +231,10 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
   result.rows.weights = Eigen::Map<const Eigen::VectorXd>(different.weights.data(), std::ssize(different.weights));
   if (given.weights.size() > 0 && !given.are_counts) result.rows.weights /= result.rows.weights.mean();
   result.rows.equal_weights = (result.rows.weights.array() == 1.0).all();
+  if (few) {  // nothing can be held out
+    describe_columns(data, given, result);
+    return result;
+  }
   result.is_hold_out_given = !given.held_out.empty();
   result.hold_outs = result.is_hold_out_given ? std::vector<HoldOut>{given_hold_out(given, different.first)}
                                               : deal(units_of(given, different.first), options.seed);

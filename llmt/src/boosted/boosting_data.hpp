@@ -20,9 +20,9 @@ struct BoostingData {
   std::vector<InputColumn> inputs;
   std::vector<OutputColumn> outputs;
   std::vector<double> deviations;
-  BinnedRows rows;    ///< with a feature for each numeric input and each level
-  Eigen::MatrixXd y;  ///< outputs of the rows
-  std::vector<HoldOut> hold_outs;
+  BinnedRows rows;                 ///< with a feature for each numeric input and each level
+  Eigen::MatrixXd y;               ///< outputs of the rows
+  std::vector<HoldOut> hold_outs;  ///< empty: too few rows, whose mean is the model
   bool is_hold_out_given = false;  ///< TrainingData::held_out: these rows are not fitted to
   Eigen::MatrixXd x;               ///< inputs of the rows
 };

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 
@@ -73,6 +74,17 @@ std::vector<int> most_used(const BoostingData& data, const std::vector<int>& use
   return inputs;
 }
 
+// Sorted; of many, evenly spaced ones, which say as much of intervals.
+std::vector<double> ascending(std::vector<double> residuals) {
+  constexpr std::size_t most = 10000;
+  std::ranges::sort(residuals);
+  const std::size_t count = residuals.size();
+  if (count <= most) return residuals;
+  std::vector<double> kept;
+  for (std::size_t k = 0; k < most; ++k) kept.push_back(residuals[(2 * k + 1) * count / (2 * most)]);
+  return kept;
+}
+
 // The fit of one output.
 class OutputFit {
  public:
@@ -87,6 +99,7 @@ class OutputFit {
   }
 
   BoostedSum fit(BoostSummary& summary, Work& work) {
+    if (data_.hold_outs.empty()) return mean_alone(summary);
     const Eigen::Index rows = y_.size();
     rounds_.tree = usual_trees(rows);
     rounds_.rate = rows < enough_for_fast ? 0.05 : 0.07;
@@ -98,10 +111,20 @@ class OutputFit {
     }
     if (options_.rate > 0.0) rounds_.rate = options_.rate;
     rounds_.most_rounds = options_.max_rounds;
-    return finish(summary, work);
+    BoostedSum sum = finish(summary, work);
+    sum.residuals = ascending(std::move(residuals_));
+    return sum;
   }
 
  private:
+  BoostedSum mean_alone(BoostSummary& summary) const {
+    summary.rows = y_.size();
+    summary.rmse = std::numeric_limits<double>::quiet_NaN();
+    summary.variant = "mean";
+    summary.train_rmse = scale_ * std::sqrt(y_.cwiseAbs2().dot(data_.rows.weights) / data_.rows.weights.sum());
+    return {.base = mean_, .features = {}, .trees = {}};
+  }
+
   Rounds race(const RoundOptions& variant, const std::string& name, BoostSummary& summary, Work& work) {
     RoundOptions few = variant;
     few.rate = race_rate;
@@ -173,6 +196,7 @@ class OutputFit {
     for (const HoldOut& rows : data_.hold_outs) {
       Work part(work, share * left);
       rounds = boost(data_.rows, y_, rows.train, rows.held_out, {}, rounds_, random_, part);
+      for (const double residual : rounds.residuals) residuals_.push_back(std::abs(residual) * scale_);
       const double weight = data_.rows.weights(rows.held_out).sum();
       squares += weight * rounds.rmse * rounds.rmse;
       held_out += weight;
@@ -222,7 +246,8 @@ class OutputFit {
   double scale_ = 1.0;
   RoundOptions rounds_;
   std::string name_;
-  std::size_t usual_ = 0;  // features without pairs
+  std::vector<double> residuals_;  // of held-out rows, absolute
+  std::size_t usual_ = 0;          // features without pairs
 };
 
 }  // namespace

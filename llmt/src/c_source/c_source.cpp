@@ -3,13 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cctype>
-#include <cmath>
-#include <stdexcept>
 #include <vector>
 
 #include "base/simd.hpp"
+#include "c_source/c_text.hpp"
 #include "c_source/runtime.hpp"
 #include "partition/leaf_validities.hpp"
 #include "partition/tree.hpp"
@@ -53,84 +50,6 @@ static double @_position(const double *codes, int count, double value) {
   return above < count && codes[above] - value < value - codes[above - 1] ? above : above - 1;
 }
 )";
-
-// Tables of C, number by number in a form that reads back exactly.
-class Tables {
- public:
-  explicit Tables(std::string name) : name_(std::move(name)) {}
-
-  static std::string number(double value) {
-    if (std::isinf(value)) return value > 0.0 ? "HUGE_VAL" : "-HUGE_VAL";
-    std::string text = fmt::format("{}", value);
-    if (text.find_first_of(".e") == std::string::npos) text += ".0";
-    return text;
-  }
-
-  /// A table, or nothing and "0" as its name if it is empty.
-  std::string add(const std::string& what, const char* type, const std::vector<std::string>& entries) {
-    if (entries.empty()) return "0";
-    const std::string table = fmt::format("{}_{}", name_, what);
-    text_ += fmt::format("\nstatic const {} {}[] = {{", type, table);
-    std::size_t column = 120;
-    for (const std::string& entry : entries) {
-      if (column + entry.size() + 2 > 110) {
-        text_ += "\n    ";
-        column = 4;
-      }
-      text_ += entry + ", ";
-      column += entry.size() + 2;
-    }
-    text_ += "\n};\n";
-    return table;
-  }
-
-  std::string add(const std::string& what, const std::vector<double>& values) {
-    std::vector<std::string> entries;
-    for (const double value : values) entries.push_back(number(value));
-    return add(what, "double", entries);
-  }
-
-  std::string add(const std::string& what, const std::vector<int>& values) {
-    std::vector<std::string> entries;
-    for (const int value : values) entries.push_back(std::to_string(value));
-    return add(what, "int", entries);
-  }
-
-  const std::string& text() const { return text_; }
-
- private:
-  std::string name_;
-  std::string text_;
-};
-
-std::string with_name(std::string text, const std::string& name) {
-  for (std::size_t at = text.find('@'); at != std::string::npos; at = text.find('@', at + name.size())) {
-    text.replace(at, 1, name);
-  }
-  return text;
-}
-
-// Whether a text begins with a mark of direction or a line separator of Unicode: U+061C, U+200E, U+200F, U+2028 to
-// U+202E, U+2066 to U+2069.
-bool begins_with_mark(std::string_view text) {
-  const auto lies = [&](const char* first, const char* last) { return text >= first && text.substr(0, 3) <= last; };
-  return text.starts_with("\xD8\x9C") || lies("\xE2\x80\x8E", "\xE2\x80\x8F") || lies("\xE2\x80\xA8", "\xE2\x80\xAE") ||
-         lies("\xE2\x81\xA6", "\xE2\x81\xA9");
-}
-
-// Text that stands in a comment: no end of it, no line breaks, no marks of direction, with which a comment may look
-// like code and of which compilers warn.
-std::string commented(const std::string& text) {
-  std::string safe;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char letter = text[i];
-    const bool plain = static_cast<unsigned char>(letter) >= 32 && letter != 127 && letter != '/' && letter != '*' &&
-                       letter != '\\' && letter != '?' && !begins_with_mark(std::string_view(text).substr(i));
-    safe += plain ? letter : '_';
-    if (!plain && static_cast<unsigned char>(letter) >= 0x80) i += letter == '\xE2' ? 2 : 1;
-  }
-  return safe;
-}
 
 void append_padded(std::vector<double>& to, const auto& values, Eigen::Index stride) {
   to.insert(to.end(), values.begin(), values.end());
@@ -233,25 +152,6 @@ void add_inputs(Tables& tables, const Model& model, const std::string& name) {
   tables.add("regressors", fmt::format("struct {}_regressor", name).c_str(), regressors);
 }
 
-std::string head_comment(const Model& model, const std::string& name) {
-  std::string text =
-      fmt::format("/* Local linear model tree, written by llmt. int {}_predict(inputs, outputs)\n", name);
-  for (std::size_t j = 0; j < model.inputs().size(); ++j) {
-    const InputColumn& input = model.inputs()[j];
-    text += fmt::format("   inputs[{}]: {}", j, commented(input.name));
-    for (std::size_t level = 0; level < input.levels.size(); ++level) {
-      text += fmt::format("{} {} = {}", level == 0 ? "," : ";",
-                          input.codes.empty() ? std::to_string(level) : fmt::format("{}", input.codes[level]),
-                          commented(input.levels[level]));
-    }
-    text += "\n";
-  }
-  for (std::size_t o = 0; o < model.outputs().size(); ++o) {
-    text += fmt::format("   outputs[{}]: {}\n", o, commented(model.outputs()[o].name));
-  }
-  return text + "   A missing input is NaN. */\n";
-}
-
 // The function that the header declares.
 std::string predict_function(Tables& tables, const Model& model, bool gaussian) {
   std::string codes;
@@ -303,23 +203,8 @@ std::string sizes(const Model& model, Eigen::Index stride) {
 
 }  // namespace
 
-bool is_c_identifier(std::string_view text) {
-  constexpr std::array<std::string_view, 37> keywords = {
-      "auto",   "break",  "case",     "char",   "const",    "continue",   "default", "do",      "double", "else",
-      "enum",   "extern", "float",    "for",    "goto",     "if",         "inline",  "int",     "long",   "register",
-      "return", "short",  "signed",   "sizeof", "static",   "struct",     "switch",  "typedef", "union",  "unsigned",
-      "void",   "while",  "restrict", "_Bool",  "_Complex", "_Imaginary", "main"};
-  const auto is_letter = [](char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; };
-  return !text.empty() && text.size() <= 31 && is_letter(text[0]) &&
-         std::ranges::all_of(text, [&](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '_'; }) &&
-         std::ranges::find(keywords, text) == keywords.end();
-}
-
 CSource to_c(const Model& model, const std::string& name, const std::string& header_name) {
-  if (!is_c_identifier(name)) {
-    throw std::invalid_argument(
-        fmt::format("llmt::to_c: name is \"{}\", must be an identifier of C of at most 31 characters", name));
-  }
+  check_c_name(name);
   const Eigen::Index stride = std::max(padded_to_quads(std::ssize(model.regressors())), quad);
   Tables tables(name);
   add_inputs(tables, model, name);
@@ -332,18 +217,9 @@ CSource to_c(const Model& model, const std::string& name, const std::string& hea
   tables.add("partitions", fmt::format("struct {}_partition", name).c_str(), partitions);
   const std::string function = predict_function(tables, model, gaussian);
   const bool codes = std::ranges::any_of(model.inputs(), [](const InputColumn& input) { return !input.codes.empty(); });
-  CSource result;
-  result.header =
-      head_comment(model, name) + with_name(
-                                      "#ifndef @_MODEL_H\n#define @_MODEL_H\n\n"
-                                      "/* 0, or 1 without touching the outputs if an input is infinite. */\n"
-                                      "int @_predict(const double *inputs, double *outputs);\n\n#endif\n",
-                                      name);
-  result.source =
-      head_comment(model, name) + fmt::format("#include \"{}\"\n\n#include <math.h>\n\n", header_name) +
-      with_name(sizes(model, stride) + c_tables, name) + tables.text() +
-      with_name(std::string(c_runtime) + (gaussian ? c_gaussians : "") + (codes ? c_codes : "") + function, name);
-  return result;
+  return c_source_of(head_comment("Local linear model tree", model.inputs(), model.outputs(), name), name, header_name,
+                     sizes(model, stride) + c_tables, tables,
+                     std::string(c_runtime) + (gaussian ? c_gaussians : "") + (codes ? c_codes : "") + function);
 }
 
 }  // namespace llmt

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <set>
 #include <stdexcept>
@@ -49,11 +50,11 @@ std::vector<double> groups_of_repeats(const GivenRows& given) {
   return {group.begin(), group.end()};
 }
 
-bool is_least_squares(const Method& method) { return method.options.max_leaves == 1; }
+bool is_least_squares(const Method& method) { return !method.boosted && method.options.max_leaves == 1; }
 
 bool is_readable(const Method& method) {
-  return rule_of(method.options.rule).is_read_most_easily && method.options.validity == ValidityChoice::crisp &&
-         method.options.terms == LocalTerms::linear;
+  return !method.boosted && rule_of(method.options.rule).is_read_most_easily &&
+         method.options.validity == ValidityChoice::crisp && method.options.terms == LocalTerms::linear;
 }
 
 void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
@@ -119,6 +120,22 @@ FitResult fit_part(const GivenRows& rows, const FitOptions& options, double shar
   return result;
 }
 
+// The same of a sum of trees.
+BoostedModel boost_part(const GivenRows& rows, const Method& method, double share, Work& work) {
+  TrainingData data{.inputs = rows.inputs.values, .outputs = rows.outputs.values, .weights = rows.weights};
+  data.groups = rows.groups;
+  data.categorical_inputs = rows.categorical;
+  Work part(work, share);
+  return fit_boosted(data, *method.boosted, part.progress()).model;
+}
+
+// What the method, fitted to some rows, says of others.
+Eigen::MatrixXd predictions(const GivenRows& fitted, const Method& method, const Eigen::MatrixXd& inputs, double share,
+                            Work& work) {
+  if (method.boosted) return boost_part(fitted, method, share, work).predict(inputs);
+  return fit_part(fitted, method.options, share, work).model.predict(inputs);
+}
+
 // The held-out errors of a method: fills in fold_rmse, cv_rmse and spread. `share`: of a fit in the work.
 void judge_on_folds(const GivenRows& given, const Method& method, const Eigen::VectorXd& error_weights,
                     const std::vector<Fold>& folds, double share, Work& work, Comparison& entry) {
@@ -126,9 +143,9 @@ void judge_on_folds(const GivenRows& given, const Method& method, const Eigen::V
   entry.fold_rmse.resize(std::ssize(folds));
   for (std::size_t f = 0; f < folds.size(); ++f) {
     const Fold& fold = folds[f];
-    const FitResult fitted = fit_part(rows_at(given, fold.train), method.options, share, work);
-    const Eigen::VectorXd error = fitted.model.predict(given.inputs.values(fold.held_out, Eigen::all)) -
-                                  Eigen::MatrixXd(given.outputs.values(fold.held_out, Eigen::all));
+    const Eigen::VectorXd error =
+        predictions(rows_at(given, fold.train), method, given.inputs.values(fold.held_out, Eigen::all), share, work) -
+        Eigen::MatrixXd(given.outputs.values(fold.held_out, Eigen::all));
     const Eigen::VectorXd weights = error_weights(fold.held_out);
     const auto add = [&](RowSpan block, WeightedMean& squares) {
       for (Eigen::Index i = block.begin; i < block.end; ++i) squares.add(error(i) * error(i), weights(i));
@@ -141,14 +158,31 @@ void judge_on_folds(const GivenRows& given, const Method& method, const Eigen::V
   entry.spread = spread_of(entry.fold_rmse);
 }
 
+// The time of a prediction of a million rows.
+template <class AnyModel>
+double predict_seconds(const AnyModel& model, const Eigen::MatrixXd& inputs, int threads) {
+  return seconds_of([&] { model.predict(inputs, threads); }) * 1e6 / static_cast<double>(inputs.rows());
+}
+
 // The model of all rows: its size, its largest jump and its times.
 void describe_model(const GivenRows& given, const Method& method, double share, Work& work, Comparison& entry) {
+  const Eigen::MatrixXd inputs = given.inputs.values;
+  if (method.boosted) {
+    std::vector<BoostedModel> all;
+    entry.fit_seconds = seconds_of([&] { all.push_back(boost_part(given, method, share, work)); });
+    entry.predict_seconds = predict_seconds(all.front(), inputs, method.boosted->max_threads);
+    const BoostedSize size = size_of(all.front());
+    entry.is_sum = true;
+    entry.trees = size.trees;
+    entry.leaves = size.leaves;
+    entry.parameters = size.parameters;
+    entry.largest_jump = std::numeric_limits<double>::quiet_NaN();
+    return;
+  }
   std::vector<FitResult> all;
   entry.fit_seconds = seconds_of([&] { all.push_back(fit_part(given, method.options, share, work)); });
   const Model& model = all.front().model;
-  const Eigen::Ref<const Eigen::MatrixXd>& inputs = given.inputs.values;
-  entry.predict_seconds =
-      seconds_of([&] { model.predict(inputs, method.options.max_threads); }) * 1e6 / static_cast<double>(inputs.rows());
+  entry.predict_seconds = predict_seconds(model, inputs, method.options.max_threads);
   entry.leaves = model.partitions().front().num_leaves();
   entry.parameters = count_parameters(model);
   entry.largest_jump = largest_jump(model, inputs);
@@ -159,6 +193,9 @@ ComparisonResult compare_rows(GivenRows given, const std::vector<Method>& method
   const Eigen::Ref<const Eigen::MatrixXd>& output = given.outputs.values;
   if (!given.held_out.empty()) {
     throw std::invalid_argument("llmt::compare: held_out is for fit(); methods are compared on CompareOptions::folds");
+  }
+  if (std::ranges::any_of(methods, [](const Method& m) { return m.boosted && m.options.loss == Loss::tukey; })) {
+    throw std::invalid_argument("llmt::compare: a sum of trees has no Loss::tukey; compare trees alone");
   }
   if (methods.empty()) throw std::invalid_argument("llmt::compare: there is no method");
   if (output.cols() != 1 || output.rows() != rows) {

@@ -1,5 +1,10 @@
-#include <algorithm>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "data/equal_rows.hpp"
 #include "data/given_rows.hpp"
 #include "data/regressors.hpp"
 #include "growth/rules/rule.hpp"
@@ -101,12 +106,52 @@ std::vector<Method> methods_of(const FitOptions& base, Eigen::Index numbers) {
   return methods.take();
 }
 
+// Different labels of rows; no labels: all rows differ.
+template <class Label>
+std::size_t count_different(const std::vector<Label>& labels, std::size_t rows) {
+  return labels.empty() ? rows : std::set<Label>(labels.begin(), labels.end()).size();
+}
+
 }  // namespace
 
 std::vector<Method> usual_methods(const FitOptions& base) { return methods_of(base, 0); }
 
 std::vector<Method> usual_methods(const FitOptions& base, const TrainingData& data) {
   return methods_of(base, count_numeric_inputs(data.inputs.cols(), given_rows(data).categorical, base));
+}
+
+Method boosted_method(const FitOptions& base) {
+  Method method{.name = "sum of trees", .options = base, .boosted = BoostOptions{}};
+  method.boosted->seed = base.folds.seed;
+  method.boosted->max_threads = base.max_threads;
+  return method;
+}
+
+std::string why_not_boosted(const FitOptions& base, const TrainingData& data) {
+  if (base.loss == Loss::tukey) return "--loss tukey, which leaves rows out";
+  const GivenRows given = given_rows(data);
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index row = 0; row < given.inputs.values.rows(); ++row) {
+    if (given.weights.size() == 0 || given.weights(row) > 0.0) rows.push_back(row);
+  }
+  // Two folds leave half of the rows, of which boosting holds fifths out, whole groups of them.
+  const RowNumbers numbers = number_rows(given.inputs.values, given.outputs.values, rows);
+  if (constexpr std::size_t fewest = 4 * fewest_boosted_rows; count_different(numbers.by_all, rows.size()) < fewest) {
+    return fmt::format("fewer than {} different rows", fewest);
+  }
+  constexpr std::size_t fewest_groups = 10;
+  const std::size_t groups = given.groups.empty() ? count_different(numbers.by_inputs, rows.size())
+                                                  : count_different(given.groups, rows.size());
+  if (groups < fewest_groups) {
+    return fmt::format("fewer than {} groups of rows, or of rows with different inputs", fewest_groups);
+  }
+  for (const int input : given.categorical) {
+    if (given.inputs.values.col(input).unaryExpr([](double x) { return std::isnan(x) ? 0.0 : x; }).maxCoeff() >=
+        most_boosted_levels) {
+      return fmt::format("a category of more than {} levels", most_boosted_levels);
+    }
+  }
+  return "";
 }
 
 }  // namespace llmt

@@ -106,6 +106,7 @@ BoostedSum sum_from(const JsonReader& json) {
     for (const JsonReader& leaf : entry.member("leaves").elements()) tree.leaves.push_back(leaf_from(leaf));
     sum.trees.push_back(std::move(tree));
   }
+  if (json.has("residuals")) sum.residuals = json.member("residuals").list<double>();
   return sum;
 }
 
@@ -139,6 +140,7 @@ std::string to_json(const BoostedModel& model) {
     for (const BoostedTree& tree : sum.trees) trees.push_back(of_tree(tree));
     json["sums"].push_back(
         {{"base", sum.base}, {"rate", sum.rate}, {"features", std::move(features)}, {"trees", std::move(trees)}});
+    if (!sum.residuals.empty()) json["sums"].back()["residuals"] = sum.residuals;
   }
   return compact_text(json);
 }

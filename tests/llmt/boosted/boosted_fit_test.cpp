@@ -1,10 +1,13 @@
 // Sums of trees, from rows to files.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <string>
+#include <vector>
 
 #include "llmt/boosted.hpp"
 #include "llmt/fit.hpp"
@@ -174,6 +177,67 @@ TEST(FitBoosted, KeepsPredictionsNearTheOutputsFarOutside) {
   EXPECT_EQ(llmt::distance_outside(model, data.inputs.topRows(1))[0], 0.0);
 }
 
+// Shares of new rows within the intervals, in fifths by their predictions, and of all rows.
+std::vector<double> coverage(std::uint64_t seed, double level) {
+  const llmt::BoostedModel model = llmt::fit_boosted(friedman(600, seed), {.seed = seed}).model;
+  const llmt::TrainingData fresh = friedman(2000, seed + 1000);
+  const Eigen::VectorXd predicted = model.predict(fresh.inputs);
+  const double width = model.half_widths(level)(0);
+  std::vector<Eigen::Index> order(2000);
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::sort(order, {}, [&](Eigen::Index row) { return predicted(row); });
+  std::vector<double> inside(6, 0.0);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    if (std::abs(fresh.outputs(order[k], 0) - predicted(order[k])) > width) continue;
+    inside[k / 400] += 1.0 / 400.0;
+    inside[5] += 1.0 / 2000.0;
+  }
+  return inside;
+}
+
+// One set of 120 residuals moves the coverage by sqrt(0.9 * 0.1 / 120) = 0.027, the mean of 20 by 0.006. That the sum
+// of all rows is better than the trees of the residuals, and that these rows stopped them, moves it by about as much.
+TEST(BoostedModel, HasIntervalsThatHoldTheLevelInEveryFifth) {
+  std::vector<double> mean(6, 0.0);
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const std::vector<double> inside = coverage(seed, 0.9);
+    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += inside[k] / 20.0;
+  }
+  EXPECT_NEAR(mean[5], 0.9, 0.03);
+  for (std::size_t fifth = 0; fifth < 5; ++fifth) EXPECT_NEAR(mean[fifth], 0.9, 0.05) << fifth;
+}
+
+TEST(BoostedModel, HasHalfWidthsThatAreOrderStatisticsOfResiduals) {
+  llmt::BoostedSum sum{.base = 1.0, .features = {{.first = 0}}, .trees = {}};
+  const auto with = [&](std::vector<double> residuals) {
+    sum.residuals = std::move(residuals);
+    return llmt::BoostedModel({{.name = "x", .low = 0.0, .high = 1.0}}, {{.name = "y", .low = 0.0, .high = 1.0}}, {1.0},
+                              {sum});
+  };
+  const llmt::BoostedModel model = with({1, 2, 3, 4, 5, 6, 7, 8, 9});
+  EXPECT_EQ(model.half_widths(0.9)(0), 9.0);
+  EXPECT_EQ(model.half_widths(0.5)(0), 5.0);
+  EXPECT_EQ(model.half_widths(0.41)(0), 5.0);
+  EXPECT_EQ(model.half_widths(0.01)(0), 1.0);
+  EXPECT_THROW(model.half_widths(0.91), std::invalid_argument);
+  EXPECT_THROW(model.half_widths(1.0), std::invalid_argument);
+  EXPECT_FALSE(with({}).has_intervals());
+  EXPECT_THROW(with({}).half_widths(0.5), std::invalid_argument);
+  EXPECT_THROW(with({2.0, 1.0}), std::invalid_argument);
+  EXPECT_THROW(with({-1.0}), std::invalid_argument);
+}
+
+TEST(FitBoosted, KeepsTheResidualsOfHeldOutRows) {
+  llmt::TrainingData data = friedman(300, 8);
+  for (Eigen::Index row = 0; row < 60; ++row) data.held_out.push_back(row);
+  const llmt::BoostedModel model = llmt::fit_boosted(data, {.max_rounds = 40}).model;
+  Eigen::VectorXd expected = (model.predict(data.inputs.topRows(60)) - data.outputs.topRows(60)).cwiseAbs();
+  std::ranges::sort(expected);
+  const std::vector<double>& found = model.sums()[0].residuals;
+  ASSERT_EQ(found.size(), 60U);
+  for (Eigen::Index k = 0; k < 60; ++k) EXPECT_NEAR(found[k], expected(k), 1e-4);
+}
+
 TEST(FitBoosted, EndsWhereTheProgressSaysSo) {
   EXPECT_THROW(llmt::fit_boosted(friedman(300, 11), {}, [](const llmt::ProgressReport&) { return false; }),
                llmt::Cancelled);
@@ -186,6 +250,17 @@ TEST(FitBoosted, PredictsAnOutputThatNeverVaries) {
   EXPECT_EQ(model.predict(data.inputs.topRows(1))(0, 0), 3.5);
 }
 
+TEST(FitBoosted, IsTheMeanOfFewRowsWhereThatIsAskedFor) {
+  llmt::TrainingData data = friedman(9, 13);
+  data.weights = Eigen::VectorXd::LinSpaced(9, 0.5, 2.5);
+  const llmt::BoostResult result = llmt::fit_boosted(data, {.mean_of_few = true});
+  EXPECT_EQ(result.summaries[0].variant, "mean");
+  EXPECT_TRUE(result.model.sums()[0].trees.empty());
+  const double mean = data.weights.dot(data.outputs.col(0)) / data.weights.sum();
+  EXPECT_NEAR(result.model.predict(data.inputs)(4, 0), mean, 1e-12);
+  EXPECT_FALSE(result.model.has_intervals());
+}
+
 void expect_refusal(const llmt::TrainingData& data, const llmt::BoostOptions& options, const std::string& words) {
   try {
     llmt::fit_boosted(data, options);
@@ -196,7 +271,7 @@ void expect_refusal(const llmt::TrainingData& data, const llmt::BoostOptions& op
 }
 
 TEST(FitBoosted, SaysWhatIsWrong) {
-  expect_refusal(friedman(9, 1), {}, "9 different rows, at least 10 are needed");
+  expect_refusal(friedman(9, 1), {}, "different rows: 9; a sum of trees needs at least 10, one tree takes fewer");
   expect_refusal(friedman(50, 1), {.rate = 1.5}, "rate is 1.5");
   expect_refusal(friedman(50, 1), {.max_rounds = 0}, "max_rounds is 0");
   llmt::TrainingData data = friedman(50, 1);
@@ -249,6 +324,7 @@ TEST(BoostedFile, SaysWhereItIsWrong) {
   expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 2.0}), "/sums/0/trees/0/leaves/0: a leaf has 3 numbers");
   expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 3.0, 2.0}), "low and high are no range");
   expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 1.0, 2.0, -1, 1.0}), "there is no feature -1");
+  expect_fault(changed("/sums/0/residuals/2", -1.0), "/sums/0/residuals/2: residuals are not finite");
   expect_fault(changed("/sums/1", Json::object()), "/sums/1");
   expect_fault("{}", "not a file of a boosted model");
 }

@@ -305,16 +305,51 @@ TEST(BoostedTree, IsTheSameWhenItsLeavesAreEstimatedAnew) {
   }
 }
 
+// The sum over the leaves of the products of the shares (J.7) times the leaf's model, held to its range.
+double blended(const llmt::BoostedTree& tree, const Eigen::VectorXd& z, int at, double share, int& blends) {
+  if (at < 0) {
+    const llmt::BoostedLeaf& leaf = tree.leaves[-1 - at];
+    double value = leaf.constant;
+    for (std::size_t k = 0; k < leaf.features.size(); ++k) value += leaf.slopes[k] * z(leaf.features[k]);
+    return share * std::min(std::max(value, leaf.low), leaf.high);
+  }
+  const llmt::BoostedSplit& split = tree.splits[at];
+  const double u = (z(split.feature) - split.threshold) / split.half_width;
+  const double right = 0.5 + u * (3.0 - u * u) / 4.0;
+  if (std::abs(u) < 1.0 && share * right >= 0.08 && share * (1.0 - right) >= 0.08) {
+    ++blends;
+    return blended(tree, z, split.left, share * (1.0 - right), blends) +
+           blended(tree, z, split.right, share * right, blends);
+  }
+  return blended(tree, z, z(split.feature) <= split.threshold ? split.left : split.right, share, blends);
+}
+
 TEST(BoostedTree, OfSoftSplitsBlendsTheSidesOfARow) {
   const Rows rows = some_rows(2000, 2, false, 0.0, 8);
-  llmt::TreeOptions options;
-  options.softness = 0.6;
-  options.depth = 3;
-  llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
-  llmt::Random random(1);
-  Eigen::VectorXd smooth = rows.z.col(0).array().square();
-  const llmt::GrowingTree tree = grower.grow(smooth, random);
-  EXPECT_TRUE(std::ranges::any_of(tree, [](const llmt::GrowingNode& node) { return node.half_width > 0.0; }));
+  const Eigen::VectorXd smooth = rows.z.col(0).array().cube();
+  for (const int depth : {1, 3}) {
+    llmt::TreeOptions options;
+    options.softness = 0.6;
+    options.depth = depth;
+    options.columns = 1.0;
+    llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
+    llmt::Random random(1);
+    const llmt::GrowingTree tree = grower.grow(smooth, random);
+    const llmt::BoostedTree done = llmt::finished(tree, rows.binned);
+    llmt::GrowingTree crisp = tree;
+    for (llmt::GrowingNode& node : crisp) node.half_width = 0.0;
+    int rows_that_blend = 0;
+    double largest = 0.0;  // distance from what the row's own side says
+    for (const int row : rows.all) {
+      int blends = 0;
+      const double value = llmt::value_at(tree, rows.binned, row);
+      EXPECT_NEAR(value, blended(done, rows.z.row(row), 0, 1.0, blends), 1e-12);
+      rows_that_blend += blends > 0 ? 1 : 0;
+      largest = std::max(largest, std::abs(value - llmt::value_at(crisp, rows.binned, row)));
+    }
+    EXPECT_GT(rows_that_blend, 200) << depth;
+    EXPECT_GT(largest, 0.05) << depth;
+  }
 }
 
 }  // namespace

@@ -6,9 +6,11 @@
 #include <limits>
 #include <string>
 
+#include "llmt/boosted.hpp"
 #include "llmt/c_source.hpp"
 #include "llmt/fit.hpp"
 #include "oracles/compiled_c.hpp"
+#include "oracles/random_boosted.hpp"
 #include "oracles/random_models.hpp"
 
 namespace {
@@ -40,14 +42,16 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 class CSource : public oracle::CompiledC {
  protected:
   // What the exported model says of rows.
-  Eigen::MatrixXd run(const llmt::Model& model, const Eigen::MatrixXd& x) const {
+  template <class AnyModel>
+  Eigen::MatrixXd run(const AnyModel& model, const Eigen::MatrixXd& x) const {
     const std::string with_inputs = replaced(driver, "%INPUTS%", std::to_string(model.num_inputs()));
     const std::string main_text = replaced(with_inputs, "%OUTPUTS%", std::to_string(model.num_outputs()));
     return run_c(llmt::to_c(model, "tree", "tree.h"), "tree", main_text, x, model.num_outputs());
   }
 
   // The bound is 0 units in the last place: both add in the same order. Gaussians rest on the same exp() here.
-  void expect_equal(const llmt::Model& model, const Eigen::MatrixXd& x, const std::string& name) {
+  template <class AnyModel>
+  void expect_equal(const AnyModel& model, const Eigen::MatrixXd& x, const std::string& name) {
     const Eigen::MatrixXd expected = model.predict(x);
     const Eigen::MatrixXd found = run(model, x);
     EXPECT_TRUE((expected.array() == found.array()).all())
@@ -105,6 +109,33 @@ TEST_F(CSource, FittedModelsWithProductsAndCodesGiveTheBytesOfTheLibrary) {
     at.col(2) = x.col(2).array() + 4.9;
     expect_equal(model, at, "fitted");
   }
+}
+
+TEST_F(CSource, SumsOfTreesGiveTheBytesOfTheLibrary) {
+  const std::vector<random_boosted::Kind> kinds = {
+      {.soft = false}, {.trees = 30, .leaves = 40, .soft = true}, {.trees = 3, .leaves = 1}, {.trees = 0}};
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    Eigen::MatrixXd x = random_boosted::rows(2000, k);
+    const llmt::BoostedModel model = random_boosted::model(kinds[k], k);
+    for (Eigen::Index row = 0; row < x.rows() && kinds[k].trees > 0 && kinds[k].leaves > 1; row += 7) {
+      const llmt::BoostedSplit& split = model.sums()[0].trees[0].splits[0];  // rows on a threshold
+      if (split.feature < 4) {
+        x(row, split.feature) =
+            model.inputs()[split.feature].centre + split.threshold * model.deviations()[split.feature];
+      }
+    }
+    expect_equal(model, x, "kind " + std::to_string(k));
+  }
+}
+
+TEST_F(CSource, AFittedSumGivesTheBytesOfTheLibrary) {
+  llmt::Random random(5);
+  llmt::TrainingData data{.inputs = random_boosted::rows(300, 2), .outputs = Eigen::MatrixXd(300, 1)};
+  for (Eigen::Index i = 0; i < 300; ++i) {
+    data.outputs(i, 0) = (std::isnan(data.inputs(i, 0)) ? 1.0 : std::abs(data.inputs(i, 0))) + 0.1 * random.normal();
+  }
+  data.categorical_inputs = {4};
+  expect_equal(llmt::fit_boosted(data).model, random_boosted::rows(1000, 3), "fitted");
 }
 
 TEST_F(CSource, InfiniteInputsAreRefusedAndTheNameIsAnIdentifier) {

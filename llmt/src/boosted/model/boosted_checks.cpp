@@ -104,6 +104,16 @@ void check_tree(const BoostedTree& tree, std::size_t features, const std::string
   }
 }
 
+void check_residuals(const std::vector<double>& residuals, const std::string& pointer) {
+  double before = 0.0;
+  for (std::size_t k = 0; k < residuals.size(); ++k) {
+    if (!std::isfinite(residuals[k]) || residuals[k] < before) {
+      fail(fmt::format("{}/residuals/{}", pointer, k), "residuals are not finite, negative or not ascending");
+    }
+    before = residuals[k];
+  }
+}
+
 }  // namespace
 
 void check_boosted(const BoostedModel& model) {
@@ -114,6 +124,7 @@ void check_boosted(const BoostedModel& model) {
     const std::string pointer = fmt::format("/sums/{}", o);
     if (!std::isfinite(sum.base)) fail(pointer, "base is not finite");
     if (!std::isfinite(sum.rate) || sum.rate <= 0.0 || sum.rate > 1.0) fail(pointer, "rate is not in (0, 1]");
+    check_residuals(sum.residuals, pointer);
     for (std::size_t k = 0; k < sum.features.size(); ++k) {
       check_feature(sum.features[k], model.inputs(), fmt::format("{}/features/{}", pointer, k));
     }

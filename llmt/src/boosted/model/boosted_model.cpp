@@ -79,6 +79,19 @@ BoostedModel::BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputCo
   check_boosted(*this);
 }
 
+BoostedSize size_of(const BoostedModel& model) {
+  BoostedSize size;
+  for (const BoostedSum& sum : model.sums()) {
+    for (const BoostedTree& tree : sum.trees) {
+      ++size.trees;
+      size.leaves += std::ssize(tree.leaves);
+      for (const BoostedLeaf& leaf : tree.leaves) size.parameters += 1 + std::ssize(leaf.slopes);
+      for (const BoostedSplit& split : tree.splits) size.parameters += split.half_width > 0.0 ? 2 : 1;
+    }
+  }
+  return size;
+}
+
 std::vector<bool> used_inputs(const BoostedModel& model) {
   std::vector<bool> used(model.num_inputs(), false);
   for (const BoostedSum& sum : model.sums()) {
@@ -137,6 +150,29 @@ Eigen::MatrixXd BoostedModel::predict(const Eigen::Ref<const Eigen::MatrixXd>& i
     }
   });
   return result;
+}
+
+bool BoostedModel::has_intervals() const {
+  return std::ranges::none_of(sums_, [](const BoostedSum& sum) { return sum.residuals.empty(); });
+}
+
+Eigen::VectorXd BoostedModel::half_widths(double level) const {
+  if (!(level > 0.0 && level < 1.0)) {
+    throw std::invalid_argument(
+        fmt::format("llmt::BoostedModel::half_widths: level is {}, it must lie between 0 and 1", level));
+  }
+  Eigen::VectorXd widths(num_outputs());
+  for (std::size_t o = 0; o < sums_.size(); ++o) {
+    const std::vector<double>& residuals = sums_[o].residuals;
+    const double rank = std::ceil(level * static_cast<double>(residuals.size() + 1) - 1e-9);
+    if (rank > static_cast<double>(residuals.size())) {
+      throw std::invalid_argument(
+          fmt::format("llmt::BoostedModel::half_widths: {} held-out residuals of \"{}\" are too few for the level {}",
+                      residuals.size(), outputs_[o].name, level));
+    }
+    widths(static_cast<Eigen::Index>(o)) = residuals[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
+  }
+  return widths;
 }
 
 }  // namespace llmt

@@ -10,11 +10,13 @@ inline double share_of_right(double z, double threshold, double half_width) {
   return 0.5 + u * (3.0 - u * u) / 4.0;
 }
 
+/// The smallest part of a row that goes to one side of a soft split.
+inline constexpr double smallest_share = 0.08;
+
 /// Whether a row, of which `share` has come to a split, goes to both sides. If one of them would get next to nothing,
 /// the side on which the row lies takes all.
 inline bool goes_both_ways(double share, double right) {
-  constexpr double smallest = 0.08;
-  return (share * right >= smallest) & (share * (1.0 - right) >= smallest);
+  return (share * right >= smallest_share) & (share * (1.0 - right) >= smallest_share);
 }
 
 }  // namespace llmt

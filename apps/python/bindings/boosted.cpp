@@ -1,0 +1,171 @@
+// Sums of trees.
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/unique_ptr.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "llmt/boosted.hpp"
+#include "llmt/boosted_explain.hpp"
+#include "llmt/c_source.hpp"
+#include "python/bindings/interruptible.hpp"
+#include "python/bindings/model_arrays.hpp"
+#include "python/bindings/module.hpp"
+#include "python/bindings/options.hpp"
+#include "python/bindings/rows.hpp"
+#include "report/fit/boosted_summary.hpp"
+#include "report/model/boosted_inspection.hpp"
+
+namespace llmt::python {
+namespace {
+
+// Explained at a time; signals are looked for in between.
+constexpr Eigen::Index explained_by_sum = 20;
+
+std::unique_ptr<BoostResult> boost_table(const Array& inputs, const Array& outputs, const Options& options,
+                                         std::vector<std::string> input_names, std::vector<std::string> output_names,
+                                         std::vector<std::vector<std::string>> levels,
+                                         const std::optional<Vector>& weights, const std::optional<Vector>& groups,
+                                         std::vector<Eigen::Index> held_out, const nb::object& report) {
+  TrainingData data = training_data_of(inputs, outputs, weights, groups);
+  data.held_out = std::move(held_out);
+  data.levels = std::move(levels);
+  data.input_names = std::move(input_names);
+  data.output_names = std::move(output_names);
+  const BoostOptions boost = boost_options_of(options);
+  std::unique_ptr<BoostResult> result;
+  interruptible(
+      [&](const Progress& progress) { result = std::make_unique<BoostResult>(fit_boosted(data, boost, progress)); },
+      report);
+  return result;
+}
+
+auto predict_by_sum(const BoostedModel& self, const Array& inputs, int threads) {
+  return stacked<double>(inputs, self.num_outputs(),
+                         [&](const Eigen::MatrixXd& block) { return self.predict(block, threads); });
+}
+
+// Lower and upper ends; no row is apart, as those of trees that lack an input are.
+auto intervals_of_sum(const BoostedModel& self, const Array& inputs, double level, int threads) {
+  const Eigen::RowVectorXd widths = self.half_widths(level).transpose();
+  const auto moved = [&](double sign) {
+    return stacked<double>(inputs, self.num_outputs(), [&](const Eigen::MatrixXd& block) -> Eigen::MatrixXd {
+      return self.predict(block, threads).rowwise() + sign * widths;
+    });
+  };
+  auto lower = moved(-1.0);
+  return std::make_tuple(std::move(lower), moved(1.0), std::vector<Eigen::Index>());
+}
+
+// How far rows lie outside of the training ranges; one column, where trees have a second one.
+auto extrapolation_of_sum(const BoostedModel& self, const Array& inputs) {
+  return stacked<double>(inputs, 1, [&](const Eigen::MatrixXd& block) -> Eigen::MatrixXd {
+    const std::vector<double> distance = distance_outside(self, block);
+    return Eigen::Map<const Eigen::VectorXd>(distance.data(), std::ssize(distance));
+  });
+}
+
+// Contributions of all rows, one matrix (rows x inputs) for each output, and the mean prediction of the background.
+auto attribute_to_sum(const BoostedModel& self, const Array& inputs, const Array& background, int threads) {
+  const Eigen::MatrixXd compared = rows_of(background);
+  std::vector<Eigen::MatrixXd> contributions(
+      self.num_outputs(), Eigen::MatrixXd(static_cast<Eigen::Index>(inputs.shape(0)), self.num_inputs()));
+  Eigen::VectorXd reference;
+  for_blocks(inputs, explained_by_sum, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
+    const Attributions found = attribute_rows(self, block, compared, threads);
+    reference = found.reference;
+    for (std::size_t o = 0; o < contributions.size(); ++o) {
+      contributions[o].middleRows(first, block.rows()) = found.contributions[o];
+    }
+  });
+  return std::make_tuple(arrays_of(std::move(contributions)), std::vector<double>(reference.begin(), reference.end()));
+}
+
+auto importance_in_sum(const BoostedModel& self, const Array& inputs, int threads) {
+  const Eigen::MatrixXd rows = rows_of(inputs);
+  Eigen::MatrixXd shares;
+  {
+    const nb::gil_scoped_release unlocked;
+    shares = importance(self, rows, threads);
+  }
+  return array_of<double>(std::move(shares));
+}
+
+auto partial_dependence_of(const BoostedModel& self, const Array& inputs, Eigen::Index input, const Vector& values,
+                           int threads) {
+  const Eigen::MatrixXd rows = rows_of(inputs);
+  const Eigen::VectorXd at = vector_of(values);
+  Eigen::MatrixXd means;
+  {
+    const nb::gil_scoped_release unlocked;
+    means = partial_dependence(self, rows, input, at, threads);
+  }
+  return array_of<double>(std::move(means));
+}
+
+std::tuple<std::string, std::string> c_source_of_sum(const BoostedModel& self, const std::string& name) {
+  CSource written = to_c(self, name, name + ".h");
+  return {std::move(written.source), std::move(written.header)};
+}
+
+std::vector<Eigen::Index> trees_of(const BoostedModel& self) {
+  std::vector<Eigen::Index> trees;
+  for (const BoostedSum& sum : self.sums()) trees.push_back(std::ssize(sum.trees));
+  return trees;
+}
+
+}  // namespace
+
+void add_boosted(nb::module_& module) {
+  using Self = BoostedModel;
+  nb::class_<Self>(module, "BoostedModel", "A sum of trees for each output.")
+      .def(nb::new_([](const std::string& text, const std::string& name) { return boosted_from_json(text, name); }),
+           nb::arg("text"), nb::arg("name") = "model", "Reads what to_json() wrote.")
+      .def("to_json", [](const Self& self) { return to_json(self); })
+      .def_prop_ro("has_intervals", [](const Self& self) { return self.has_intervals(); })
+      .def("inputs", [](const Self& self) { return columns_of(self.inputs()); })
+      .def("outputs", [](const Self& self) { return targets_of(self.outputs()); })
+      .def("used_inputs", [](const Self& self) { return used_inputs(self); })
+      .def("trees", &trees_of)
+      .def("size",
+           [](const Self& self) {
+             const BoostedSize size = size_of(self);
+             return std::make_tuple(size.trees, size.leaves, size.parameters);
+           })
+      .def("predict", &predict_by_sum, nb::arg("inputs"), nb::arg("threads") = 0)
+      .def(
+          "extrapolation",
+          [](const Self& self, const Array& inputs, int) { return extrapolation_of_sum(self, inputs); },
+          nb::arg("inputs"), nb::arg("threads") = 0)
+      .def("intervals", &intervals_of_sum, nb::arg("inputs"), nb::arg("level"), nb::arg("threads") = 0)
+      .def("attribute", &attribute_to_sum, nb::arg("inputs"), nb::arg("background"), nb::arg("threads") = 0)
+      .def("importance", &importance_in_sum, nb::arg("inputs"), nb::arg("threads") = 0)
+      .def("partial_dependence", &partial_dependence_of, nb::arg("inputs"), nb::arg("input"), nb::arg("values"),
+           nb::arg("threads") = 0)
+      .def("to_c", &c_source_of_sum, nb::arg("name"))
+      .def("text", [](const Self& self, const std::string& name, std::size_t width) {
+        return report::boosted_inspection_text(self, name, width);
+      });
+  nb::class_<BoostResult>(module, "BoostFit", "A boosted fit with all that reports need of it.")
+      .def("model", [](const BoostResult& self) { return to_json(self.model); })
+      .def("summary",
+           [](const BoostResult& self, const std::string& data) {
+             return report::boosted_json({.data = data, .output = ""}, self).dump();
+           })
+      .def("text", [](const BoostResult& self, const std::string& data, std::size_t width) {
+        return report::boosted_text({.data = data, .output = ""}, self, width);
+      });
+  module.def("boost", &boost_table, nb::arg("inputs"), nb::arg("outputs"), nb::arg("options"), nb::kw_only(),
+             nb::arg("input_names"), nb::arg("output_names"), nb::arg("levels"), nb::arg("weights") = nb::none(),
+             nb::arg("groups") = nb::none(), nb::arg("held_out") = std::vector<Eigen::Index>(),
+             nb::arg("report") = nb::none());
+}
+
+}  // namespace llmt::python

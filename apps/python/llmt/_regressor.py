@@ -1,0 +1,280 @@
+"""What the estimators share: tables in, predictions out, model files."""
+
+import os
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from . import _advice
+from ._base import BaseEstimator, NotFittedError, RegressorMixin
+from ._model import TextModel
+from .tables import Table, read_column, read_table, read_targets, row_labels
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+_most_seeds = 2**31
+
+
+@dataclass(frozen=True)
+class FitRows:
+    """What `fit` was given, read and checked."""
+
+    table: Table  # the rows of an eval_set below the others
+    outputs: np.ndarray  # (rows, targets)
+    weights: np.ndarray | None
+    groups: np.ndarray | None
+    held_out: list[int]  # positions of the rows of an eval_set
+    fitted: int  # rows without those
+
+
+class TableRegressor(RegressorMixin, BaseEstimator):
+    """The part of an estimator that reads tables, predicts, and keeps its model as text."""
+
+    _of_file: ClassVar[type[TextModel]]
+    _why_no_intervals: ClassVar[str]
+
+    if TYPE_CHECKING:
+        categorical_features: Any
+        random_state: Any
+        n_jobs: int | None
+        model_: Any
+        summary_: dict[str, Any]
+        _fit: Any
+
+    def predict(self, X: Any) -> np.ndarray:
+        """Predictions, (rows,), or (rows, targets) where y had two dimensions."""
+        return self._shaped(self._model().handle.predict(self._table(X).values, self._threads()))
+
+    def predict_interval(self, X: Any, coverage: float = 0.9) -> np.ndarray:
+        """Intervals that hold the share `coverage` of the targets (docs/algorithms/intervals.md).
+
+        Returns
+        -------
+        ndarray, (rows, 2), or (rows, 2, targets) where y had two dimensions
+            Lower and upper ends.
+
+        Raises
+        ------
+        ValueError
+            If nothing was held out in the fit, or too few rows for the coverage.
+
+        Warns
+        -----
+        UserWarning
+            Of rows outside of the training ranges, for which no interval is honest. `check` says where they are.
+        """
+        handle = self._model().handle
+        level = share("coverage", coverage)
+        if not handle.has_intervals:
+            raise ValueError(
+                f"predict_interval needs rows that were held out, and this model has none: {self._why_no_intervals}"
+            )
+        values = self._table(X).values
+        lower, upper, _ = handle.intervals(values, level, self._threads())
+        outside = np.flatnonzero(handle.extrapolation(values, self._threads())[:, 0] > 0)
+        if len(outside):
+            warnings.warn(
+                f"{len(outside)} of {len(values)} rows lie outside of the training ranges, the first is row {outside[0]}: "
+                "their intervals are not to be believed; check(X) names the columns",
+                stacklevel=2,
+            )
+        ends = np.stack([lower, upper], axis=1)
+        return ends[:, :, 0] if self._is_flat else ends
+
+    def to_json(self) -> str:
+        """The model as JSON text, as `llmt fit -o` writes it."""
+        text: str = self._model().to_json()
+        return text
+
+    def save(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the model file that `llmt predict` and `load` read."""
+        self._model().save(path)
+
+    @classmethod
+    def load(cls, path: "str | os.PathLike[str]") -> "Self":
+        """An estimator with the model of a file. What belongs to the fit alone, such as summary_, is not in files."""
+        estimator = cls()
+        estimator._take_model(cls._of_file.load(path))
+        return estimator
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(super().__getstate__())
+        if "_fit" in state:
+            state["_fit"] = None
+        return state
+
+    def __sklearn_is_fitted__(self) -> bool:
+        return hasattr(self, "model_")
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        tags.input_tags.categorical = True
+        tags.input_tags.string = True
+        tags.target_tags.multi_output = True
+        return tags
+
+    def _read_rows(self, X: Any, y: Any, sample_weight: Any, groups: Any, eval_set: Any, robust: str) -> "FitRows":
+        """Reads and checks what `fit` is given, and warns of what is probably not meant. `robust`: how a fit
+        that is robust to gross errors in y is asked for; empty: this one is."""
+        table = read_table(X, categorical=self.categorical_features, owner=type(self).__name__)
+        outputs, names = read_targets(y, owner=type(self).__name__)
+        check_rows(len(table.values), len(outputs))
+        rows = len(outputs)
+        self.n_outputs_ = 1 if outputs.ndim == 1 else outputs.shape[1]
+        self._is_flat = outputs.ndim == 1
+        outputs = outputs.reshape(rows, -1)
+        weights = weights_of(sample_weight, rows)
+        labels = None if groups is None else row_labels(groups, rows)
+        self._inputs = names_of(table)
+        self._outputs = names or target_names(self.n_outputs_)
+        self._levels = table.levels
+        held_out: list[int] = []
+        if eval_set is not None:
+            if groups is not None:
+                raise ValueError("groups deal folds, and eval_set takes their place: give one of them")
+            values, judged = self._evaluation(eval_set, table, outputs)
+            held_out = list(range(rows, rows + len(judged)))
+            table = Table(np.vstack([table.values, values]), table.names, table.levels, table.unknown)
+            outputs = np.vstack([outputs, judged])
+            weights = None if weights is None else np.concatenate([weights, np.ones(len(judged))])
+        meant = {str(name) for name in self.categorical_features}
+        _advice.warn_of_accidental_inputs(table, meant, stacklevel=4)
+        _advice.check_targets(outputs, self._outputs, robust, stacklevel=4)
+        _advice.warn_of_few_rows(rows, stacklevel=4)
+        return FitRows(table, outputs, weights, labels, held_out, rows)
+
+    def _take_rows(self, rows: "FitRows") -> None:
+        """Remembers of the rows of a fit what predictions and views need."""
+        self._remember_columns(rows.table)
+        self._sample = spread(rows.table.values[: rows.fitted], 500)
+
+    def _take_model(self, model: TextModel) -> None:
+        """Sets all that a model file says."""
+        columns = model.handle.inputs()
+        self.model_ = model
+        self._inputs = [column["name"] for column in columns]
+        self._outputs = model.handle.outputs()
+        self._levels = [list(column["levels"]) if not column["codes"] else [] for column in columns]
+        self.n_features_in_ = len(columns)
+        self.feature_names_in_ = np.asarray(self._inputs, dtype=object)
+        self.n_outputs_ = len(self._outputs)
+        self._is_flat = self.n_outputs_ == 1
+        self._fit = None
+        self._sample = np.array([[column["centre"] for column in columns]])
+        self.summary_ = {}
+
+    def _evaluation(self, given: Any, table: Table, outputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Inputs and targets of an eval_set, read as the training rows were."""
+        if len(given) == 1 and len(given[0]) == 2:  # a list of one pair, as boosters take it
+            given = given[0]
+        if len(given) != 2:
+            raise ValueError("eval_set must be a pair (X, y)")
+        X, y = given
+        rows = read_table(X, levels=table.levels, fitted_names=table.names, name="eval_set[0]").values
+        judged, _ = read_targets(y)
+        check_rows(len(rows), len(judged))
+        judged = judged.reshape(len(judged), -1)
+        if judged.shape[1] != outputs.shape[1]:
+            raise ValueError(f"eval_set has {judged.shape[1]} targets, y has {outputs.shape[1]}")
+        return rows, judged
+
+    def _model(self) -> Any:
+        if not hasattr(self, "model_"):
+            raise NotFittedError(
+                f"This {type(self).__name__} instance is not fitted yet. Call 'fit' with appropriate arguments before "
+                "using this estimator."
+            )
+        return self.model_
+
+    def _table(self, X: Any) -> Table:
+        self._model()
+        return read_table(X, levels=self._levels, fitted_names=self._fitted_names(), owner=type(self).__name__)
+
+    def _fitted_names(self) -> list[str] | None:
+        names = getattr(self, "feature_names_in_", None)
+        return None if names is None else list(names)
+
+    def _remember_columns(self, table: Table) -> None:
+        self.n_features_in_ = table.values.shape[1]
+        if table.names is not None:
+            self.feature_names_in_ = np.asarray(table.names, dtype=object)
+        elif hasattr(self, "feature_names_in_"):
+            del self.feature_names_in_
+
+    def _shaped(self, values: np.ndarray) -> np.ndarray:
+        return values[:, 0] if self._is_flat else values
+
+    def _threads(self) -> int:
+        if self.n_jobs is None or self.n_jobs == -1:
+            return 0
+        return count("n_jobs", self.n_jobs)
+
+    def _seed(self) -> int:
+        if self.random_state is None:
+            return 1
+        if isinstance(self.random_state, np.random.RandomState):
+            return int(self.random_state.randint(_most_seeds))
+        return count("random_state", self.random_state)
+
+
+def check_rows(inputs: int, outputs: int) -> None:
+    if inputs != outputs:
+        raise ValueError(f"Found input variables with inconsistent numbers of samples: [{inputs}, {outputs}]")
+
+
+def weights_of(sample_weight: Any, rows: int) -> np.ndarray | None:
+    if sample_weight is None:
+        return None
+    weights, _ = read_column(sample_weight, name="sample_weight")
+    if weights.ndim != 1:
+        raise ValueError("Sample weights must be 1D array or scalar")
+    if len(weights) != rows:
+        raise ValueError(f"sample_weight.shape == {weights.shape}, expected {(rows,)}!")
+    if not np.isfinite(weights).all() or (weights < 0).any():
+        raise ValueError("sample_weight: weights must be finite and not negative")
+    if not weights.any():
+        raise ValueError("sample_weight: all weights are zero")
+    return weights
+
+
+def names_of(table: Table) -> list[str]:
+    if table.names is not None:
+        return list(table.names)
+    return [f"x{position}" for position in range(table.values.shape[1])]
+
+
+def target_names(outputs: int) -> list[str]:
+    return ["y"] if outputs == 1 else [f"y{position}" for position in range(outputs)]
+
+
+def share(name: str, value: Any) -> float:
+    number = float(value)
+    if not 0.0 < number < 1.0:
+        hint = f": {number / 100.0:g} for {number:g} %" if 1.0 < number < 100.0 else ""
+        raise ValueError(f"{name} is {value!r}; it must lie between 0 and 1{hint}")
+    return number
+
+
+def count(name: str, value: Any) -> int:
+    """A parameter that is a whole number of 0 or more; None is 0, which is the default."""
+    if value is None:
+        return 0
+    try:
+        number = int(value)
+    except (TypeError, ValueError):
+        number = -1
+    if number < 0 or number != value:
+        raise ValueError(f"{name} is {value!r}; it must be a whole number of 0 or more")
+    return number
+
+
+def spread(values: np.ndarray, most: int) -> np.ndarray:
+    """At most so many rows as importance() looks at, evenly spaced."""
+    rows = len(values)
+    if rows <= most:
+        return np.array(values)
+    return np.array(values[[row * rows // most for row in range(most)]])

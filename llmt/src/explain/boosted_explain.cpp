@@ -1,0 +1,111 @@
+#include "llmt/boosted_explain.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "base/checks.hpp"
+#include "base/parallel.hpp"
+#include "explain/tree_game.hpp"
+
+namespace llmt {
+namespace {
+
+void check_table(const std::string& function, const std::string& argument, const BoostedModel& model,
+                 const Eigen::Ref<const Eigen::MatrixXd>& rows) {
+  if (rows.rows() < 1 || rows.cols() != model.num_inputs()) {
+    throw std::invalid_argument(fmt::format("{}: {} is {} x {}, it must have a row and the model's {} inputs", function,
+                                            argument, rows.rows(), rows.cols(), model.num_inputs()));
+  }
+  check_finite_or_missing(function.c_str(), argument.c_str(), rows);
+}
+
+// Contributions of a row, outputs x inputs. `rows_of_background`: a column for each row.
+Eigen::MatrixXd contributions_of(const BoostedModel& model, const Eigen::VectorXd& x,
+                                 const Eigen::MatrixXd& rows_of_background) {
+  Eigen::MatrixXd contributions(model.num_outputs(), model.num_inputs());
+  for (std::size_t o = 0; o < model.sums().size(); ++o) {
+    const BoostedSum& sum = model.sums()[o];
+    Eigen::VectorXd values = Eigen::VectorXd::Zero(model.num_inputs());
+    for (Eigen::Index row = 0; row < rows_of_background.cols(); ++row) {
+      TwoRows rows(model, sum, x.data(), rows_of_background.col(row).data());
+      for (const BoostedTree& tree : sum.trees) rows.add_values(tree, sum.rate, values);
+    }
+    contributions.row(static_cast<Eigen::Index>(o)) =
+        values.transpose() / static_cast<double>(rows_of_background.cols());
+  }
+  return contributions;
+}
+
+}  // namespace
+
+Attributions attribute_rows(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                            const Eigen::Ref<const Eigen::MatrixXd>& background, int max_threads) {
+  check_table("llmt::attribute", "inputs", model, inputs);
+  check_table("llmt::attribute", "background", model, background);
+  Attributions result{
+      .predictions = model.predict(inputs, max_threads),
+      .reference = model.predict(background, max_threads).colwise().mean().transpose(),
+      .contributions = {static_cast<std::size_t>(model.num_outputs()), Eigen::MatrixXd(inputs.rows(), inputs.cols())}};
+  const Eigen::MatrixXd rows_of_background = background.transpose();
+  parallel_for(inputs.rows(), max_threads, [&](Eigen::Index row) {
+    const Eigen::MatrixXd of_row = contributions_of(model, inputs.row(row).transpose(), rows_of_background);
+    for (Eigen::Index o = 0; o < of_row.rows(); ++o) result.contributions[o].row(row) = of_row.row(o);
+  });
+  return result;
+}
+
+Attribution attribute(const BoostedModel& model, const Eigen::Ref<const Eigen::VectorXd>& point,
+                      const Eigen::Ref<const Eigen::MatrixXd>& background) {
+  const Attributions rows = attribute_rows(model, point.transpose(), background, 1);
+  Attribution result{.prediction = rows.predictions.row(0).transpose(),
+                     .reference = rows.reference,
+                     .contributions = Eigen::MatrixXd(model.num_outputs(), model.num_inputs())};
+  for (Eigen::Index o = 0; o < model.num_outputs(); ++o) result.contributions.row(o) = rows.contributions[o].row(0);
+  return result;
+}
+
+Eigen::MatrixXd background_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs, Eigen::Index most) {
+  const Eigen::Index count = std::min(inputs.rows(), most);
+  Eigen::MatrixXd rows(count, inputs.cols());
+  for (Eigen::Index k = 0; k < count; ++k) rows.row(k) = inputs.row(k * inputs.rows() / count);
+  return rows;
+}
+
+Eigen::MatrixXd importance(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                           int max_threads) {
+  check_table("llmt::importance", "inputs", model, inputs);
+  const Attributions rows = attribute_rows(model, background_of(inputs, boosted_importance_rows),
+                                           background_of(inputs, boosted_importance_background), max_threads);
+  Eigen::MatrixXd shares(model.num_outputs(), model.num_inputs());
+  for (Eigen::Index o = 0; o < model.num_outputs(); ++o) {
+    shares.row(o) = rows.contributions[o].cwiseAbs().colwise().sum();
+    const double total = shares.row(o).sum();
+    const OutputColumn& output = model.outputs()[o];
+    const double rounding = 1e-14 * std::max(std::abs(output.low), std::abs(output.high));
+    shares.row(o) *= total > rounding * static_cast<double>(rows.predictions.rows()) ? 1.0 / total : 0.0;
+  }
+  return shares;
+}
+
+Eigen::MatrixXd partial_dependence(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                   Eigen::Index input, const Eigen::Ref<const Eigen::VectorXd>& values,
+                                   int max_threads) {
+  check_table("llmt::partial_dependence", "inputs", model, inputs);
+  if (input < 0 || input >= model.num_inputs()) {
+    throw std::invalid_argument(fmt::format("llmt::partial_dependence: there is no input {}, the model has {} inputs",
+                                            input, model.num_inputs()));
+  }
+  Eigen::MatrixXd result(values.size(), model.num_outputs());
+  Eigen::MatrixXd rows = inputs;
+  for (Eigen::Index k = 0; k < values.size(); ++k) {
+    rows.col(input).setConstant(values(k));
+    result.row(k) = model.predict(rows, max_threads).colwise().mean();
+  }
+  return result;
+}
+
+}  // namespace llmt
