@@ -114,12 +114,14 @@ TEST(LlmtProgram, CompareListsTheMethodsAndRecommendsOne) {
     names.push_back(method["method"]);
     errors[names.back()] = method["cv_rmse"];
     EXPECT_EQ(method["fold_rmse"].size(), 3U) << names.back();
+    if (names.back() == "sum of trees") continue;  // its leaves have a constant and slopes of their path; jumps add up
     EXPECT_GE(method["parameters"], 3 * method["leaves"].get<int>()) << names.back();
     EXPECT_GE(method["largest_jump"], 0.0) << names.back();
   }
-  EXPECT_EQ(names, (std::vector<std::string>{"least squares", "crisp tree, RD", "crisp tree, RETIS", "crisp tree, RA",
-                                             "M5', smoothed", "Gaussians, as grown", "Gaussians, re-estimated",
-                                             "blend, joint", "LOLIMOT", "HILOMOT", "crisp tree, quadratic leaves"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"least squares", "crisp tree, RD", "crisp tree, RETIS", "crisp tree, RA",
+                                      "M5', smoothed", "Gaussians, as grown", "Gaussians, re-estimated", "blend, joint",
+                                      "LOLIMOT", "HILOMOT", "crisp tree, quadratic leaves", "sum of trees"}));
   ASSERT_TRUE(errors.contains(result["recommended"])) << result["recommended"];
   EXPECT_LT(errors[result["recommended"]], 0.5 * errors["least squares"]);
   const std::string why = result["recommendation"];

@@ -16,7 +16,7 @@ using nlohmann::json;
 using program::Folder;
 using program::Outcome;
 
-std::string kinked(int rows, std::uint64_t seed) {
+std::string kinked_table(int rows, std::uint64_t seed) {
   llmt::Random random(seed);
   std::string text = "a,b,y\n";
   for (int i = 0; i < rows; ++i) {
@@ -30,8 +30,8 @@ const std::string program_path = LLMT_PROGRAM;
 
 TEST(TableProgram, ATableThatFitsGivesTheModelOfItsCsvFile) {
   const Folder folder;
-  const std::string first = kinked(1500, 1);
-  const std::string second = kinked(1500, 2);
+  const std::string first = kinked_table(1500, 1);
+  const std::string second = kinked_table(1500, 2);
   folder.write("a.csv", first);
   folder.write("b.csv", second);
   folder.write("both.csv", first + second.substr(second.find('\n') + 1));
@@ -43,7 +43,7 @@ TEST(TableProgram, ATableThatFitsGivesTheModelOfItsCsvFile) {
 
 TEST(TableProgram, AFitGoesOnFromItsCheckpointAndItsModelPredicts) {
   const Folder folder;
-  folder.write("d.csv", kinked(6000, 3));
+  folder.write("d.csv", kinked_table(6000, 3));
   ASSERT_EQ(folder.run(program_path + " table d.csv -o d.arrow").exit_code, 0);
   const std::string fit = program_path + " fit d.arrow -t y --memory 200K --validity crisp --json ";
   const Outcome whole = folder.run(fit + "--checkpoint state -o whole.json");
@@ -63,7 +63,7 @@ TEST(TableProgram, AFitGoesOnFromItsCheckpointAndItsModelPredicts) {
 
 TEST(TableProgram, WhatIsNotPossibleIsNamed) {
   const Folder folder;
-  folder.write("d.csv", kinked(100, 4));
+  folder.write("d.csv", kinked_table(100, 4));
   folder.write("e.csv", "a,y\n1,2\n");
   const auto says = [&](const std::string& arguments, int exit_code, const char* text) {
     const Outcome outcome = folder.run(program_path + " " + arguments);

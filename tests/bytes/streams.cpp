@@ -35,20 +35,20 @@ const std::vector<StreamSet>& stream_sets() {
 }
 
 std::string learn_and_hash(const StreamSet& set) {
-  constexpr Eigen::Index rows = 2400;
-  Sample sample = make_sample(rows, 4);
+  constexpr Eigen::Index learned_rows = 2400;
+  Sample sample = make_sample(learned_rows, 4);
   if (set.outputs == 2) add_output(sample);
-  if (set.changes) sample.outputs.bottomRows(rows / 2) *= -2.0;
+  if (set.changes) sample.outputs.bottomRows(learned_rows / 2) *= -2.0;
   if (set.gaps) remove_values(sample.inputs);
-  const Eigen::VectorXd weights = set.gaps ? make_weights(rows) : Eigen::VectorXd();
+  const Eigen::VectorXd weights = set.gaps ? make_weights(learned_rows) : Eigen::VectorXd();
   llmt::StreamOptions options;
   set.apply(options);
   llmt::Stream stream(sample.inputs.cols(), sample.outputs.cols(), options);
   const Eigen::MatrixXd queries = make_queries();
   Hash predictions;
   // Blocks of different sizes.
-  for (Eigen::Index begin = 0, size = 1; begin < rows; begin += size, size = (size * 3) % 701 + 1) {
-    const Eigen::Index count = std::min(size, rows - begin);
+  for (Eigen::Index begin = 0, size = 1; begin < learned_rows; begin += size, size = (size * 3) % 701 + 1) {
+    const Eigen::Index count = std::min(size, learned_rows - begin);
     stream.add(sample.inputs.middleRows(begin, count), sample.outputs.middleRows(begin, count),
                set.gaps ? weights.segment(begin, count) : weights);
     predictions.add(stream.predict(queries));

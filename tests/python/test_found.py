@@ -163,7 +163,7 @@ def test_a_delay_is_applied_to_other_runs_by_their_times():
     time, inputs, simulated, measured = log(2)
     left = measured - found.correct(inputs, simulated, time=time)
     assert np.std(left) < 0.4 * np.std(measured - simulated)
-    with pytest.raises(RuntimeError, match="depends on when the rows were taken, which is not given"):
+    with pytest.raises(ValueError, match="depends on when the rows were taken, which is not given"):
         found.correct(inputs, simulated)
     with pytest.raises(ValueError, match=r"correct\(inputs, simulated, time=...\) has it"):
         found.predict(inputs, simulated)

@@ -15,7 +15,7 @@ struct RowOfWindow {
   double z = 0.0;
 };
 
-struct LeafSums {
+struct SumsOfLeaf {
   SideSums all;
   SideSums left;
   bool slope = false;
@@ -35,11 +35,11 @@ TreeGrower::Choice TreeGrower::refined(std::span<const int> leaves, Choice choic
   const int first = bin == column.last_cells.begin() ? 0 : *(bin - 1) + 1;
   const int last = *(bin + 1);
   if (last - first < 2) return choice;
-  std::vector<LeafSums> sums(leaves.size());
+  std::vector<SumsOfLeaf> sums(leaves.size());
   std::vector<std::vector<RowOfWindow>> of_leaf(leaves.size());
   parallel_for(std::ssize(leaves), max_threads_, [&](Eigen::Index i) {
     const GrowingNode& node = tree_[leaves[i]];
-    LeafSums& of_this = sums[i];
+    SumsOfLeaf& of_this = sums[i];
     SideSums all;
     SideSums left;
     const std::uint16_t* const cells = column.cells.data();
@@ -69,7 +69,7 @@ TreeGrower::Choice TreeGrower::refined(std::span<const int> leaves, Choice choic
   double best = 0.0;
   for (std::size_t k = 0; k + 1 < window.size(); ++k) {
     const RowOfWindow& one = window[k];
-    LeafSums& of_leaf_of_row = sums[one.leaf];
+    SumsOfLeaf& of_leaf_of_row = sums[one.leaf];
     of_leaf_of_row.left.add(one.weight, one.residual, one.z);
     gain -= of_leaf_of_row.gain;
     of_leaf_of_row.gain = of_leaf_of_row.gain_of_sides(options_.ridges);

@@ -9,17 +9,19 @@
 #include "stream/stream_archive.hpp"
 
 namespace llmt {
-namespace {
 
-constexpr const char* stream_format_name = "llmt-stream";
-constexpr int stream_format_version = 1;
-
-// The nodes that a node leads to, as positions in the list of nodes; -1: none.
-struct Links {
+// The nodes that a node leads to, as positions in the list of nodes; -1: none. Members of StreamJson capture lists of
+// it.
+struct StreamLinks {
   int left = -1;
   int right = -1;
   int alternate = -1;
 };
+
+namespace {
+
+constexpr const char* stream_format_name = "llmt-stream";
+constexpr int stream_format_version = 1;
 
 // A tree's nodes, every node before those that it leads to.
 std::vector<const StreamNode*> nodes_of(const StreamNode& root) {
@@ -34,11 +36,11 @@ std::vector<const StreamNode*> nodes_of(const StreamNode& root) {
 }
 
 // The links of nodes in the order of nodes_of().
-std::vector<Links> links_of(const std::vector<const StreamNode*>& nodes) {
-  std::vector<Links> links;
+std::vector<StreamLinks> links_of(const std::vector<const StreamNode*>& nodes) {
+  std::vector<StreamLinks> links;
   int next = 1;
   for (const StreamNode* node : nodes) {
-    Links& of = links.emplace_back();
+    StreamLinks& of = links.emplace_back();
     if (!node->is_leaf()) {
       of.left = next++;
       of.right = next++;
@@ -49,8 +51,8 @@ std::vector<Links> links_of(const std::vector<const StreamNode*>& nodes) {
 }
 
 // Puts the nodes into each other; the first one is the root.
-std::unique_ptr<StreamNode> joined(std::vector<std::unique_ptr<StreamNode>> nodes, const std::vector<Links>& links,
-                                   const JsonReader& json) {
+std::unique_ptr<StreamNode> joined(std::vector<std::unique_ptr<StreamNode>> nodes,
+                                   const std::vector<StreamLinks>& links, const JsonReader& json) {
   const auto take = [&](std::size_t from, int at) {
     if (static_cast<std::size_t>(at) <= from || at >= std::ssize(nodes) || nodes[at] == nullptr) {
       json.fail(fmt::format("node {} leads to {}, which is not a later node, or has been led to before", from, at));
@@ -154,7 +156,7 @@ struct StreamJson {
   }
 
   template <class Archive>
-  static void fields(Archive& archive, InArchive<Archive, StreamNode>& node, InArchive<Archive, Links>& links,
+  static void fields(Archive& archive, InArchive<Archive, StreamNode>& node, InArchive<Archive, StreamLinks>& links,
                      const StreamSetting& setting) {
     const Eigen::Index inputs = setting.inputs;
     archive.numbers("origin", node.basis.origin, inputs);
@@ -259,7 +261,7 @@ struct StreamJson {
       fields(inner, tree.setting_);
       fields(inner, tree.counts_);
       const std::vector<const StreamNode*> nodes = nodes_of(tree.root());
-      const std::vector<Links> links = links_of(nodes);
+      const std::vector<StreamLinks> links = links_of(nodes);
       inner.parts("nodes", std::ssize(nodes),
                   [&](StreamWriter& node, Eigen::Index k) { fields(node, *nodes[k], links[k], tree.setting_); });
     });
@@ -280,7 +282,7 @@ struct StreamJson {
       StreamTree& tree = state.add_tree(setting, Eigen::VectorXd::Zero(setting.coefficients()));
       fields(inner, tree.counts_);
       std::vector<std::unique_ptr<StreamNode>> nodes;
-      std::vector<Links> links;
+      std::vector<StreamLinks> links;
       const JsonReader json = inner.json().member("nodes");
       inner.parts("nodes", json.size(), [&](StreamReader& node, Eigen::Index) {
         nodes.push_back(std::make_unique<StreamNode>());

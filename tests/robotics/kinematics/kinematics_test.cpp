@@ -169,7 +169,9 @@ TEST(RollPitchYaw, MakeTheSameRotationNextToAQuarterTurnOfPitch) {
       const Frame again{.rpy_deg = angles / degree};
       const double most = digits < 12 ? 4e-15 : 2e-12;  // what is nearer counts as a quarter turn
       EXPECT_LT((frame_matrix(again).linear() - rotation).cwiseAbs().maxCoeff(), most) << frame.rpy_deg(1);
-      if (digits < 3) EXPECT_LT((again.rpy_deg - frame.rpy_deg).cwiseAbs().maxCoeff(), 1e-10);
+      if (digits < 3) {
+        EXPECT_LT((again.rpy_deg - frame.rpy_deg).cwiseAbs().maxCoeff(), 1e-10);
+      }
     }
   }
 }

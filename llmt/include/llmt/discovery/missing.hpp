@@ -169,8 +169,9 @@ struct Missing {
   int rounds = 0;
 };
 
-/// Whether what was found is not to be added: it failed on the rows set aside, or the sum of Gap::after^2 / before^2 over
-/// the outputs is larger than their number, as where a term makes errors of the inputs larger than what it explains.
+/// Whether what was found is not to be added: it failed on the rows set aside, or the sum of Gap::after^2 / before^2
+/// over the outputs is larger than their number, as where a term makes errors of the inputs larger than what it
+/// explains.
 bool is_worse(const Missing& missing);
 
 }  // namespace llmt::discovery

@@ -61,9 +61,10 @@ std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string&
 ///   carries, J and b the inertia and damping in front of it. To first order, for which y is s,
 ///   y - s = -(1/k) (ds/dq w + (ds/da - J) d2w/dt2), with three free coefficients: compliance 1/k, inertia J/k, damping
 ///   b/k.
-///   resonance -share (s - H s), H(p) = (2 zeta w p + w^2) / (p^2 + 2 zeta w p + w^2), p = d/dt, w = 2 pi frequency: this
-///   share of the simulated output moves a load behind a spring and damper, which rings; frequency and damping ratio
-///   zeta are searched, zeta up to 0.2. Exact for a signal that is a straight line between rows.
+///   resonance -share (s - H s), H(p) = (2 zeta w p + w^2) / (p^2 + 2 zeta w p + w^2), p = d/dt, w = 2 pi frequency:
+///   this share of the simulated output moves a load behind a spring and damper, which rings. Frequency and damping
+///   ratio zeta are searched, zeta below 0.16: what is damped more is rather a filter. Exact for a signal that is a
+///   straight line between rows.
 /// Derivatives by time are those of local polynomials; ds/dq and ds/da are those of a function that is fitted to the
 /// table. `simulated` n x d. Empty for less than 60 rows. Throws as standard_terms().
 std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::MatrixXd& simulated,

@@ -125,14 +125,15 @@ std::vector<std::string> notes_on_reversals(const std::vector<Reversals>& revers
   return notes;
 }
 
-// Terms of a state that were found with a constant beyond all that were tried.
+// Terms of a state whose frequency is at an end of those tried, or whose damping ratio is the largest.
 std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms) {
   std::set<std::size_t> beyond;
   for (const FoundTerm& found : missing.found) {
     const ModelTerm& term = terms[found.term];
     for (Eigen::Index k = 0; k < found.constants.size() && !term.inner_state.empty(); ++k) {
       const std::vector<double>& tried = term.constants[static_cast<std::size_t>(k)].tried;
-      if (found.constants(k) < tried.front() || found.constants(k) > tried.back()) beyond.insert(found.term);
+      const bool is_below = k == 0 && found.constants(k) <= tried.front();
+      if (is_below || found.constants(k) >= tried.back()) beyond.insert(found.term);
     }
   }
   return beyond;
