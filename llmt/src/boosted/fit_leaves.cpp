@@ -159,13 +159,15 @@ void TreeGrower::share_rows() {
       const bool is_missing = cell == missing_cell;
       const bool is_right = is_missing ? !node.missing_left : cell > node.cell;
       const double soft = share_of_right(z, threshold, node.half_width);
-      const bool both = !is_missing & (std::abs(z - threshold) < node.half_width) & goes_both_ways(share, soft);
-      const double to_right = both ? soft : (is_right ? 1.0 : 0.0);
+      // Sums and products of 0 and 1 in place of branches, which would be guessed wrongly.
+      const int both = static_cast<int>(!is_missing) * static_cast<int>(std::abs(z - threshold) < node.half_width) *
+                       static_cast<int>(goes_both_ways(share, soft));
+      const double to_right = both != 0 ? soft : (is_right ? 1.0 : 0.0);
       left.rows[in_left] = right.rows[in_right] = row;
       left.shares[in_left] = share * (1.0 - to_right);
       right.shares[in_right] = share * to_right;
-      in_left += both | !is_right ? 1 : 0;
-      in_right += both | is_right ? 1 : 0;
+      in_left += std::max(both, static_cast<int>(!is_right));
+      in_right += std::max(both, static_cast<int>(is_right));
     }
     left.rows.resize(in_left);
     left.shares.resize(in_left);

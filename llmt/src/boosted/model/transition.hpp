@@ -2,6 +2,8 @@
 /// How much of a row goes to the right at a soft split.
 #pragma once
 
+#include <algorithm>
+
 namespace llmt {
 
 /// 1/2 + u (3 - u^2) / 4 with u = (z - threshold) / half_width, for |u| < 1: continuous with its derivative.
@@ -16,7 +18,7 @@ inline constexpr double smallest_share = 0.08;
 /// Whether a row, of which `share` has come to a split, goes to both sides. If one of them would get next to nothing,
 /// the side on which the row lies takes all.
 inline bool goes_both_ways(double share, double right) {
-  return (share * right >= smallest_share) & (share * (1.0 - right) >= smallest_share);
+  return share * std::min(right, 1.0 - right) >= smallest_share;
 }
 
 }  // namespace llmt
