@@ -38,7 +38,7 @@ std::string title_of(const discovery::FoundTerm& found, bool several_outputs) {
 std::string value_text(const discovery::TermValue& value) {
   std::string text = fmt::format("{} = {}", value.name, number(value.value));
   if (std::isfinite(value.standard_error)) text += fmt::format(" +- {}", number(value.standard_error, 2));
-  return text + " " + value.unit;
+  return value.unit == "1" ? text : text + " " + value.unit;
 }
 
 std::string time_text(const discovery::TimeUse& time, const std::string& column) {

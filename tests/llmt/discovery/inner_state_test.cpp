@@ -77,7 +77,7 @@ TEST(InnerState, DelayIsMeasured) {
     EXPECT_EQ(missing.answer, Answer::inner_state);
     ASSERT_EQ(missing.found.size(), 1u);
     EXPECT_EQ(missing.found.front().family, "delay");
-    EXPECT_EQ(missing.found.front().values.front().unit, "s");
+    EXPECT_EQ(missing.found.front().values.front().unit, "units of time");
     EXPECT_NEAR(missing.found.front().coefficients(0), delay,
                 4.0 * missing.found.front().values.front().standard_error);
   }
@@ -192,6 +192,37 @@ TEST(InnerState, ResonanceIsMeasured) {
     EXPECT_NEAR(found.constants(0), frequency, 0.1);
     EXPECT_NEAR(found.constants(1), zeta, 0.02);
     EXPECT_LT(missing.gaps.front().after, 0.4 * missing.gaps.front().before);
+  }
+}
+
+TEST(InnerState, ACorrectionThatMakesTheGapLargerIsWorse) {
+  const auto missing_with = [](std::vector<std::pair<double, double>> gaps) {
+    Missing missing;
+    for (const auto& [before, after] : gaps) {
+      missing.gaps.push_back({.output = "u", .before = before, .after = after, .noise_floor = 0.1});
+    }
+    return missing;
+  };
+  EXPECT_FALSE(is_worse(missing_with({{0.5, 0.5}})));  // nothing was found
+  EXPECT_FALSE(is_worse(missing_with({{0.5, 0.4}})));
+  EXPECT_TRUE(is_worse(missing_with({{0.5, 0.6}})));
+  EXPECT_TRUE(is_worse(missing_with({{0.0, 0.1}})));
+  EXPECT_FALSE(
+      is_worse(missing_with({{0.5, 0.55}, {100.0, 20.0}})));  // outputs count by their gaps, whatever their unit
+  EXPECT_TRUE(is_worse(missing_with({{0.5, 1.0}, {100.0, 20.0}})));
+  Missing failed = missing_with({{0.5, 0.4}});
+  failed.answer = Answer::failed_held_out;
+  EXPECT_TRUE(is_worse(failed));
+}
+
+// The filter of a recording: a resonance of so much damping is none.
+TEST(InnerState, WhatHardlyRingsIsNoResonance) {
+  const auto torque = [](double t) { return nominal(t) + (motion(t, 1, one) < 0.0 ? -8.0 : 8.0); };
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    Log log = log_of(seed, 0.2, torque);
+    for (Eigen::Index i = 0; i < rows; ++i) log.simulated(i, 0) = torque(log.inputs.instants(i));
+    log.measured.values.col(0) -= 0.6 * integrated(log.inputs.instants, 2.0 * std::numbers::pi * 6.0, 0.6, torque);
+    for (const FoundTerm& found : missing_from(log).found) EXPECT_NE(found.family, "resonance") << seed;
   }
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "discovery/terms/missing_findings.hpp"
+
 namespace llmt::discovery {
 namespace {
 
@@ -32,7 +34,8 @@ Missing Alternatives::state_for_terms(Missing found) const {
     return found;
   }
   Missing of_state = without({}, [](const ModelTerm& term) { return term.inner_state.empty(); });
-  const bool is_better = of_state.answer == Answer::inner_state && left_on_held_out(of_state) < left_on_held_out(found);
+  const bool holds = of_state.answer == Answer::inner_state && beyond_constants(of_state, *terms_).empty();
+  const bool is_better = holds && left_on_held_out(of_state) < left_on_held_out(found);
   return is_better ? of_state : found;
 }
 

@@ -26,7 +26,7 @@ class Alternatives {
         refuted_(&refuted) {}
 
   /// A state and terms of the row itself explain a part of each other. Where a term of a state was refuted beside
-  /// others, and such terms alone leave clearly less than what was found without them, they are the answer.
+  /// others, but such terms alone hold and leave less than what was found without them, they are the answer.
   Missing state_for_terms(Missing found) const;
 
   /// Shapes follow noise that is alike in neighbours farther than causes do, and they follow what is small beside the

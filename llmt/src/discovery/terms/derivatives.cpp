@@ -5,18 +5,23 @@
 #include <cmath>
 
 namespace llmt::discovery {
-std::vector<Recorded> recordings(const Rows& rows) {
-  const auto n = std::ssize(rows.sequence);
+
+double median_step(const Rows& rows) {
   std::vector<double> steps;
-  for (Eigen::Index k = 1; k < n; ++k) {
+  for (std::size_t k = 1; k < rows.sequence.size(); ++k) {
     const double step = rows.instants(rows.sequence[k]) - rows.instants(rows.sequence[k - 1]);
     if (step > 0.0) steps.push_back(step);
   }
-  std::vector<Recorded> all(n);
-  if (steps.empty()) return all;
+  if (steps.empty()) return 0.0;
   std::ranges::nth_element(steps, steps.begin() + std::ssize(steps) / 2);
-  constexpr double interruption = 3.0;  // steps
-  const double longest = interruption * steps[steps.size() / 2];
+  return steps[steps.size() / 2];
+}
+
+std::vector<Recorded> recordings(const Rows& rows) {
+  const auto n = std::ssize(rows.sequence);
+  std::vector<Recorded> all(n);
+  const double longest = interruption * median_step(rows);
+  if (!(longest > 0.0)) return all;
   Eigen::Index begin = 0;
   for (Eigen::Index k = 1; k <= n; ++k) {
     const double step = k < n ? rows.instants(rows.sequence[k]) - rows.instants(rows.sequence[k - 1]) : 0.0;

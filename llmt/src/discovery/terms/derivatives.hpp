@@ -15,7 +15,13 @@ struct Recorded {
   Eigen::Index end = 0;
 };
 
-/// One for each place of the sequence. A recording ends where time jumps back or by more than 3 median steps.
+/// The step in time in the middle of all that go forwards; 0: there is none.
+double median_step(const Rows& rows);
+
+/// A longer step, in median steps, interrupts a recording.
+inline constexpr double interruption = 3.0;
+
+/// One for each place of the sequence. A recording ends where time jumps back or is interrupted.
 std::vector<Recorded> recordings(const Rows& rows);
 
 /// First and second derivatives by time at every row, of any column of values: local least squares of a polynomial of

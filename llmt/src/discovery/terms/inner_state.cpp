@@ -50,7 +50,7 @@ ModelTerm delay(const std::shared_ptr<OfRows>& of_rows, const std::string& outpu
           .output = output,
           .inner_state = "a delay or a first-order lag",
           .shown_by = "a signal measured behind the actuator, or a step of the command on the clock of the inputs",
-          .unit = "s"};
+          .unit = "units of time"};
 }
 
 ModelTerm resonance(const std::string& output, std::vector<double> frequencies) {
@@ -69,7 +69,7 @@ ModelTerm resonance(const std::string& output, std::vector<double> frequencies) 
             constexpr double most = 0.2;  // more is a filter: it hardly rings
             return -resonant_part(rows, std::max(constants(0), 1e-300), std::clamp(constants(1), least, most));
           },
-          .constants = {constant("frequency", "Hz", std::move(frequencies)),
+          .constants = {constant("frequency", "per unit of time", std::move(frequencies)),
                         constant("damping ratio", "1", {0.02, 0.04, 0.08, 0.16})},
           .output = output,
           .inner_state = "a resonance, as of a load behind a spring",

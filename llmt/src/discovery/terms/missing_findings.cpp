@@ -215,9 +215,22 @@ void demand_certainty(Missing& missing) {
   if (is_named && !std::ranges::all_of(missing.found, &FoundTerm::confirmed)) missing.answer = Answer::unknown;
 }
 
+std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms) {
+  std::set<std::size_t> beyond;
+  for (const FoundTerm& found : missing.found) {
+    const ModelTerm& term = terms[found.term];
+    for (Eigen::Index k = 0; k < found.constants.size() && !term.inner_state.empty(); ++k) {
+      const std::vector<double>& tried = term.constants[static_cast<std::size_t>(k)].tried;
+      const bool is_below = k == 0 && found.constants(k) <= tried.front();
+      if (is_below || found.constants(k) >= tried.back()) beyond.insert(found.term);
+    }
+  }
+  return beyond;
+}
+
 bool is_worse(const Missing& missing) {
   double left = 0.0;
-  for (const Gap& gap : missing.gaps) left += gap.before > 0.0 ? std::pow(gap.after / gap.before, 2.0) : 1.0;
+  for (const Gap& gap : missing.gaps) left += gap.after == gap.before ? 1.0 : std::pow(gap.after / gap.before, 2.0);
   return missing.answer == Answer::failed_held_out || left > static_cast<double>(missing.gaps.size());
 }
 

@@ -1,6 +1,11 @@
 // The outcome of a search in the words of find_missing().
 #pragma once
 
+#include <cstddef>
+#include <set>
+#include <string>
+#include <vector>
+
 #include "discovery/terms/term_question.hpp"
 
 namespace llmt::discovery {
@@ -37,6 +42,10 @@ void decide(Missing& missing, bool in_time);
 
 /// What is named is certain: with a term that is not confirmed the answer is "unknown".
 void demand_certainty(Missing& missing);
+
+/// The indices in `terms` of those terms of a state that were found with a frequency at an end of those tried, or with
+/// the largest damping ratio tried or more: a filter, no machine, has such constants.
+std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms);
 
 /// Of the errors of an output on the samples set aside: at the nominal parameters, with parameters alone, with terms.
 Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,

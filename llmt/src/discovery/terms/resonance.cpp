@@ -59,23 +59,10 @@ class Oscillator {
   }
 };
 
-// The step in the middle of all.
-double usual_step(const Rows& rows) {
-  std::vector<double> steps;
-  for (std::size_t k = 1; k < rows.sequence.size(); ++k) {
-    const double step = rows.instants(rows.sequence[k]) - rows.instants(rows.sequence[k - 1]);
-    if (step > 0.0) steps.push_back(step);
-  }
-  if (steps.empty()) return 0.0;
-  std::ranges::nth_element(steps, steps.begin() + std::ssize(steps) / 2);
-  return steps[steps.size() / 2];
-}
-
 }  // namespace
 
 Eigen::VectorXd resonant_part(const Rows& rows, double frequency, double damping) {
-  constexpr double steps = 3.0;
-  const double longest = std::max(1.0 / frequency, steps * usual_step(rows));
+  const double longest = std::max(1.0 / frequency, interruption * median_step(rows));
   Oscillator oscillator(frequency, damping);
   Eigen::VectorXd part(rows.simulated.size());
   for (std::size_t k = 0; k < rows.sequence.size(); ++k) {
@@ -98,7 +85,7 @@ std::vector<double> resonant_frequencies(const Rows& rows) {
   constexpr double steps_of_a_period = 3.0;
   constexpr double ratio = 1.08;
   constexpr int most = 40;
-  const double step = usual_step(rows);
+  const double step = median_step(rows);
   if (!(step > 0.0)) return {};
   const double lowest = lag_of_a_period / (step * static_cast<double>(smooth_lag(rows, rows.simulated)));
   const double highest = 1.0 / (steps_of_a_period * step);

@@ -1,4 +1,4 @@
-// The part of a signal that a spring in its way takes off or adds.
+// What a load behind a spring takes off a signal that moves it.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,8 +14,9 @@ namespace llmt::discovery {
 /// rows were left out, is bridged by such a line. 0 < damping < 1.
 Eigen::VectorXd resonant_part(const Rows& rows, double frequency, double damping);
 
-/// Frequencies (per unit of the instants) that may be told from the motion: from that of a sine which changes as fast
-/// as the simulated output to one third of a sample each; at most 40. Empty: there is none.
+/// Frequencies, per unit of the instants, that may be told from those of the motion: from that of a sine which changes
+/// as fast as the simulated output up to one period in three rows, in ratios of 1.08 or more; at most 40. Empty: there
+/// is none.
 std::vector<double> resonant_frequencies(const Rows& rows);
 
 }  // namespace llmt::discovery

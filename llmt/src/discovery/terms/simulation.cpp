@@ -125,20 +125,6 @@ std::vector<std::string> notes_on_reversals(const std::vector<Reversals>& revers
   return notes;
 }
 
-// Terms of a state whose frequency is at an end of those tried, or whose damping ratio is the largest.
-std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms) {
-  std::set<std::size_t> beyond;
-  for (const FoundTerm& found : missing.found) {
-    const ModelTerm& term = terms[found.term];
-    for (Eigen::Index k = 0; k < found.constants.size() && !term.inner_state.empty(); ++k) {
-      const std::vector<double>& tried = term.constants[static_cast<std::size_t>(k)].tried;
-      const bool is_below = k == 0 && found.constants(k) <= tried.front();
-      if (is_below || found.constants(k) >= tried.back()) beyond.insert(found.term);
-    }
-  }
-  return beyond;
-}
-
 // Searches until what is found holds on the rows set aside. Terms that are refuted there are no candidates of the next
 // search, which sets other rows aside. In time, what follows noise that is alike in neighbours lives on few rows: a
 // term must shrink the gap on the rows set aside, of one search or the next.
@@ -157,7 +143,7 @@ Missing find_at(const Simulation& simulation, const Inputs& inputs, const Measur
         missing.answer != Answer::failed_held_out && std::ranges::none_of(missing.found, [&](const FoundTerm& found) {
           return !found.hangs_on.empty() || is_unproven(found) || beyond.contains(found.term);
         });
-    if (holds || trial == most) {
+    if (holds || (trial >= most && beyond.empty())) {
       const Alternatives alternatives{simulation, inputs, measured, terms, rows, options, refuted};
       missing = alternatives.state_for_terms(std::move(missing));
       missing = alternatives.causes_for_shapes(std::move(missing));
@@ -170,17 +156,13 @@ Missing find_at(const Simulation& simulation, const Inputs& inputs, const Measur
       const bool fails_again = is_unproven(found) && !unproven.insert(found.term).second;
       if (!found.is_refuted && !fails_again && found.hangs_on.empty()) continue;
       refuted.insert(found.term);
-      if (!found.hangs_on.empty()) {
-        notes.push_back(
-            fmt::format("{} {} was found and taken back: without the rows at which {} is small it is not there",
-                        found.family, found.location, found.hangs_on));
-        continue;
-      }
-      const std::string name =
-          found.generic ? "an error pattern of " + found.location : fmt::format("{} {}", found.family, found.location);
-      notes.push_back(found.is_refuted
-                          ? name + " was found and taken back: it makes the error on rows set aside larger"
-                          : name + " was found and taken back: it does not make the error on rows set aside smaller");
+      const std::string place = found.location.empty() ? "" : " " + found.location;
+      const std::string name = found.generic ? "an error pattern of" + place : found.family + place;
+      notes.push_back(name + " was found and taken back: " +
+                      (!found.hangs_on.empty()
+                           ? fmt::format("without the rows at which {} is small it is not there", found.hangs_on)
+                       : found.is_refuted ? "it makes the error on rows set aside larger"
+                                          : "it does not make the error on rows set aside smaller"));
     }
     ++options.seed;
   }
