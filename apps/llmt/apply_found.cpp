@@ -25,15 +25,53 @@ Eigen::MatrixXd outputs_of(const Csv& csv, const std::vector<std::string>& outpu
   return csv.numbers(columns);
 }
 
+// Times and runs of the rows, from the columns of these names or those of the search.
+struct Times {
+  report::RowTimes of_rows;
+  std::vector<LabelColumn> labels;
+  std::string column;  // of the times; may be empty
+};
+
+Times times_of(const ApplyArguments& arguments, const report::FoundTerms& found, const Csv& csv) {
+  Times times;
+  const auto column = [&](const std::string& given, const std::string& known, const char* option) -> std::string {
+    if (!given.empty()) return given;
+    if (known.empty() || csv.has(known)) return known;
+    if (!found.needs_time()) return "";
+    throw std::runtime_error(
+        fmt::format("{}: there is no column \"{}\", as in the search; terms of {} depend on the "
+                    "past of a run ({} COLUMN names it)",
+                    csv.name(), known, found.file, option));
+  };
+  if (const std::string name = column(arguments.time, found.time, "--time"); !name.empty()) {
+    times.of_rows.instants = instants_of(csv, name);
+    times.column = name;
+    times.labels.push_back({name, csv.texts(name)});
+  }
+  if (const std::string name = column(arguments.group, found.group, "--group"); !name.empty()) {
+    times.of_rows.runs = runs_of(csv, name);
+    times.labels.push_back({name, csv.texts(name)});
+  }
+  return times;
+}
+
 // n x d, or empty if there are none.
-Eigen::MatrixXd measured_outputs(const ApplyArguments& arguments, const report::FoundTerms& found,
-                                 const Csv& simulated) {
+Eigen::MatrixXd measured_outputs(const ApplyArguments& arguments, const report::FoundTerms& found, const Csv& simulated,
+                                 const Times& times) {
   const std::vector<std::string> outputs = found.output_names();
   if (!arguments.measured.empty()) {
     const Csv measured = Csv::read(arguments.measured, arguments.mark);
     if (measured.rows() != simulated.rows()) {
       throw std::runtime_error(fmt::format("{} has {} rows, {} has {}", simulated.name(), simulated.rows(),
                                            measured.name(), measured.rows()));
+    }
+    std::vector<std::string> both;
+    for (const std::string& name : found.input_names()) {
+      if (measured.has(name)) both.push_back(name);
+    }
+    read_same_inputs(simulated, measured, both, false);
+    if (!times.column.empty() && measured.has(times.column)) {
+      refuse_other_times(simulated, measured, times.column, instants_of(measured, times.column));
     }
     return outputs_of(measured, outputs, "_measured");
   }
@@ -71,34 +109,6 @@ std::map<std::string, Eigen::MatrixXd> derivatives_of(const ApplyArguments& argu
 
 double rms(const Eigen::VectorXd& errors) {
   return std::sqrt(errors.squaredNorm() / static_cast<double>(errors.size()));
-}
-
-// Times and runs of the rows, from the columns of these names or those of the search.
-struct Times {
-  report::RowTimes of_rows;
-  std::vector<LabelColumn> labels;
-};
-
-Times times_of(const ApplyArguments& arguments, const report::FoundTerms& found, const Csv& csv) {
-  Times times;
-  const auto column = [&](const std::string& given, const std::string& known, const char* option) -> std::string {
-    if (!given.empty()) return given;
-    if (known.empty() || csv.has(known)) return known;
-    if (!found.needs_time()) return "";
-    throw std::runtime_error(
-        fmt::format("{}: there is no column \"{}\", as in the search; terms of {} depend on the "
-                    "past of a run ({} COLUMN names it)",
-                    csv.name(), known, found.file, option));
-  };
-  if (const std::string name = column(arguments.time, found.time, "--time"); !name.empty()) {
-    times.of_rows.instants = instants_of(csv, name);
-    times.labels.push_back({name, csv.texts(name)});
-  }
-  if (const std::string name = column(arguments.group, found.group, "--group"); !name.empty()) {
-    times.of_rows.runs = runs_of(csv, name);
-    times.labels.push_back({name, csv.texts(name)});
-  }
-  return times;
 }
 
 struct RowsOf {
@@ -150,9 +160,9 @@ Gaps gaps_of(const CorrectedTable& table, const Times& times) {
       cells.insert(cells.end(), {number(before), number(after)});
       of_rows.add(std::move(cells));
       if (after > before) {
-        gaps.grown.push_back(fmt::format("The gap of {}{} is larger with what was found: it does not hold for {} rows",
-                                         table.outputs[o], is_all ? "" : " in run " + part.run,
-                                         is_all ? "these" : "its"));
+        gaps.grown.push_back(fmt::format("The gap of {} is larger with what was found{}", table.outputs[o],
+                                         is_all ? ": it does not hold for these rows"
+                                                : fmt::format(" in the run \"{}\": it does not hold there", part.run)));
       }
     }
   }
@@ -179,7 +189,7 @@ void apply_found(const ApplyArguments& arguments) {
                        .values = simulated.numbers(found.input_names()),
                        .simulated = outputs_of(simulated, found.output_names(), "_simulated"),
                        .corrected = {},
-                       .measured = measured_outputs(arguments, found, simulated),
+                       .measured = measured_outputs(arguments, found, simulated, times),
                        .labels = times.labels};
   const bool is_measured = table.measured.size() > 0;
   if (arguments.corrected.empty() && arguments.code.empty() && !is_measured) {
@@ -220,7 +230,7 @@ void write_code(const std::string& path, const report::FoundTerms& found) {
 
 void apply_command(const CLI::App& command, ApplyArguments arguments, const std::vector<std::string>& outputs) {
   for (const char* option : {"--target", "--inputs", "--order", "--terms", "--allow", "--held-out", "--only",
-                             "--without", "--own-terms-only", "--input-noise"}) {
+                             "--without", "--own-terms-only", "--input-noise", "--seed"}) {
     if (command.get_option(option)->count() > 0) {
       throw std::invalid_argument(fmt::format("--apply excludes {}: what was found says it", option));
     }

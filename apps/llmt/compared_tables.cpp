@@ -25,26 +25,6 @@ Eigen::MatrixXd read_named_inputs(const Csv& csv, const std::vector<std::string>
   }
 }
 
-// The inputs, which both files must have alike.
-Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, const std::vector<std::string>& names,
-                                 bool every_column) {
-  const Eigen::MatrixXd one = read_named_inputs(simulated, names, every_column);
-  Eigen::MatrixXd other = read_named_inputs(measured, names, every_column);
-  // Files are written with a limited number of digits.
-  constexpr double rounding = 1e-6;
-  const Eigen::RowVectorXd ranges = one.colwise().maxCoeff() - one.colwise().minCoeff();
-  for (Eigen::Index i = 0; i < one.rows(); ++i) {
-    for (Eigen::Index j = 0; j < one.cols(); ++j) {
-      if (std::abs(one(i, j) - other(i, j)) <= rounding * std::max(ranges(j), 1e-3 * std::abs(one(i, j)))) continue;
-      throw std::runtime_error(
-          fmt::format("{}:{}: column \"{}\" is {}, but {} at {}:{}; rows must stand in the same order in both files",
-                      measured.name(), measured.line_of(i), names[j], other(i, j), one(i, j), simulated.name(),
-                      simulated.line_of(i)));
-    }
-  }
-  return other;
-}
-
 // A time of its own for each row of a run.
 void refuse_equal_times(const Csv& csv, const std::string& column, const discovery::Inputs& inputs) {
   std::map<std::pair<Eigen::Index, double>, Eigen::Index> taken;
@@ -56,22 +36,6 @@ void refuse_equal_times(const Csv& csv, const std::string& column, const discove
         fmt::format("{}:{}: column \"{}\" is {}, as in line {}; rows of a run are taken one after the other{}",
                     csv.name(), csv.line_of(i), column, inputs.instants(i), csv.line_of(place->second),
                     inputs.runs.empty() ? " (--group COLUMN tells several runs apart)" : ""));
-  }
-}
-
-// Clocks may start anywhere, but must agree within half a step afterwards.
-void refuse_other_times(const Csv& simulated, const Csv& measured, const std::string& column,
-                        const Eigen::VectorXd& instants) {
-  const Eigen::VectorXd others = instants_of(simulated, column);
-  const double step = (instants.maxCoeff() - instants.minCoeff()) / static_cast<double>(instants.size());
-  for (Eigen::Index i = 0; i < instants.size(); ++i) {
-    const double since = instants(i) - instants(0);
-    const double other = others(i) - others(0);
-    if (std::abs(since - other) <= 0.5 * step) continue;
-    throw std::runtime_error(fmt::format(
-        "{}:{}: column \"{}\" is {} after the first row, but {} in {}; rows must stand in the same order in both "
-        "files, and times have one unit",
-        measured.name(), measured.line_of(i), column, since, other, simulated.name()));
   }
 }
 
@@ -93,6 +57,40 @@ void read_times(const ComparedTables& tables, const Csv& simulated, const Csv& m
 }
 
 }  // namespace
+
+Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, const std::vector<std::string>& names,
+                                 bool every_column) {
+  const Eigen::MatrixXd one = read_named_inputs(simulated, names, every_column);
+  Eigen::MatrixXd other = read_named_inputs(measured, names, every_column);
+  // Files are written with a limited number of digits.
+  constexpr double rounding = 1e-6;
+  const Eigen::RowVectorXd ranges = one.colwise().maxCoeff() - one.colwise().minCoeff();
+  for (Eigen::Index i = 0; i < one.rows(); ++i) {
+    for (Eigen::Index j = 0; j < one.cols(); ++j) {
+      if (std::abs(one(i, j) - other(i, j)) <= rounding * std::max(ranges(j), 1e-3 * std::abs(one(i, j)))) continue;
+      throw std::runtime_error(
+          fmt::format("{}:{}: column \"{}\" is {}, but {} at {}:{}; rows must stand in the same order in both files",
+                      measured.name(), measured.line_of(i), names[j], other(i, j), one(i, j), simulated.name(),
+                      simulated.line_of(i)));
+    }
+  }
+  return other;
+}
+
+void refuse_other_times(const Csv& simulated, const Csv& measured, const std::string& column,
+                        const Eigen::VectorXd& instants) {
+  const Eigen::VectorXd others = instants_of(simulated, column);
+  const double step = (instants.maxCoeff() - instants.minCoeff()) / static_cast<double>(instants.size());
+  for (Eigen::Index i = 0; i < instants.size(); ++i) {
+    const double since = instants(i) - instants(0);
+    const double other = others(i) - others(0);
+    if (std::abs(since - other) <= 0.5 * step) continue;
+    throw std::runtime_error(fmt::format(
+        "{}:{}: column \"{}\" is {} after the first row, but {} in {}; rows must stand in the same order in both "
+        "files, and times have one unit",
+        measured.name(), measured.line_of(i), column, since, other, simulated.name()));
+  }
+}
 
 Eigen::VectorXd instants_of(const Csv& csv, const std::string& column) {
   if (!csv.has(column)) return csv.numbers(column);  // says which columns there are

@@ -41,6 +41,16 @@ struct Comparison {
 /// Times of the rows. Throws std::runtime_error for a cell that is not a number.
 Eigen::VectorXd instants_of(const Csv& csv, const std::string& column);
 
+/// The inputs, which both files must have alike, n x names; `every_column`: they were not named. Throws
+/// std::runtime_error naming file, line and column of a row that differs.
+Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, const std::vector<std::string>& names,
+                                 bool every_column);
+
+/// Throws std::runtime_error for a row whose time since the first differs in the two files by more than half a step.
+/// `instants`: those of `measured`.
+void refuse_other_times(const Csv& simulated, const Csv& measured, const std::string& column,
+                        const Eigen::VectorXd& instants);
+
 /// The run that each row is of, numbered as they first occur.
 std::vector<Eigen::Index> runs_of(const Csv& csv, const std::string& column);
 

@@ -37,6 +37,9 @@ void add_simulation_options(CLI::App& command, SimulationArguments& arguments) {
 
 void check(const SimulationArguments& arguments) {
   const auto refuse = [](const char* reason) { throw std::invalid_argument(reason); };
+  if (!arguments.apply.empty() && (!arguments.command.empty() || !arguments.nominal_values.empty())) {
+    refuse("--apply excludes --simulate and --parameter: the values are those that were found");
+  }
   if (!arguments.command.empty() && !arguments.parameters.empty()) {
     refuse("--simulate and --parameters exclude each other: the command gives the derivatives");
   }
@@ -45,9 +48,6 @@ void check(const SimulationArguments& arguments) {
   }
   if (!arguments.nominal_values.empty() && arguments.command.empty() && arguments.parameters.empty()) {
     refuse("--parameter needs --parameters FILE or --simulate COMMAND");
-  }
-  if (!arguments.apply.empty() && (!arguments.command.empty() || !arguments.nominal_values.empty())) {
-    refuse("--apply excludes --simulate and --parameter: the values are those that were found");
   }
   if (arguments.parameters_are_set && arguments.apply.empty()) refuse("--parameters-are-set needs --apply");
 }

@@ -61,6 +61,42 @@ Eigen::VectorXd column(const Folder& folder, const std::string& file, const std:
   return llmt::Csv::read(folder.file(file)).numbers(name);
 }
 
+// A torque with dry friction, of which a load behind a spring of 6 Hz takes 60 %; in single steps of 0.5 ms.
+void write_ringing_log(const Folder& folder, const std::string& name, std::uint64_t seed) {
+  llmt::Random random(seed);
+  const double phase = random.uniform(0.0, 6.0);
+  constexpr double omega = 2.0 * std::numbers::pi * 6.0;
+  constexpr double zeta = 0.08;
+  constexpr double h = 5e-4;
+  constexpr int steps = 40;
+  std::string simulated = "t,q,dq,ddq,u\n";
+  std::string measured = simulated;
+  double z = 0.0;
+  double speed = 0.0;
+  for (int i = 0; i < 1000 * steps; ++i) {
+    const double t = h * i;
+    double q[3] = {0.0, 0.0, 0.0};
+    for (const double frequency : {0.15, 0.4, 0.7}) {
+      const double w = 2.0 * std::numbers::pi * frequency;
+      q[0] += 0.3 * std::sin(w * t + phase * frequency);
+      q[1] += 0.3 * w * std::cos(w * t + phase * frequency);
+      q[2] -= 0.3 * w * w * std::sin(w * t + phase * frequency);
+    }
+    const double u = 40.0 * q[0] + q[1] + 3.0 * q[2] + (q[1] < 0.0 ? -8.0 : 8.0);
+    if (i == 0) z = u / (omega * omega);
+    const double acceleration = u - 2.0 * zeta * omega * speed - omega * omega * z;
+    if (i % steps == 0) {
+      const std::string inputs = fmt::format("{:.4f},{:.9g},{:.9g},{:.9g}", t, q[0], q[1], q[2]);
+      simulated += fmt::format("{},{:.9g}\n", inputs, u);
+      measured += fmt::format("{},{:.9g}\n", inputs, u - 0.6 * acceleration + 0.2 * random.normal());
+    }
+    speed += h * acceleration;
+    z += h * speed;
+  }
+  folder.write(name + "_s.csv", simulated);
+  folder.write(name + "_m.csv", measured);
+}
+
 const std::string in_time = " -t u --time t --group run ";
 
 TEST(DiscoverInTime, CorrectedTablesKeepTimesAndRuns) {
@@ -94,8 +130,15 @@ TEST(DiscoverInTime, ApplyPrintsTheGapOfEachRun) {
   for (const json& gap : gaps["runs"]) squares += std::pow(gap["after"].get<double>(), 2.0) / 3.0;
   EXPECT_NEAR(std::sqrt(squares), gaps["gap"][0]["after"].get<double>(), 1e-9);
   EXPECT_LT(gaps["gap"][0]["after"].get<double>(), 0.2 * gaps["gap"][0]["before"].get<double>());
-  // One run of them is of a machine without drag.
+  // A machine without drag; and one run of it among others.
   write_log(folder, "free", 1, 200, 0.0, 0.0, 3);
+  for (const char* file : {"s", "m"}) {
+    folder.run(fmt::format("(cat other_{0}.csv; sed '1d; s/run 1/run 4/' free_{0}.csv) > mixed_{0}.csv", file));
+  }
+  const Outcome mixed = folder.run(discover + "--apply found.json mixed_s.csv mixed_m.csv");
+  EXPECT_NE(mixed.out.find("The gap of u is larger with what was found in the run \"run 4\": it does not hold there."),
+            std::string::npos)
+      << mixed.out;
   const Outcome grown = folder.run(discover + "--apply found.json free_s.csv free_m.csv");
   EXPECT_NE(grown.out.find("The gap of u is larger with what was found: it does not hold for these rows."),
             std::string::npos)
@@ -134,6 +177,50 @@ TEST(DiscoverInTime, ADelayIsAppliedToOtherRunsByTheirTimes) {
   EXPECT_EQ(few.exit_code, 1);
   EXPECT_NE(few.err.find("the term delay depends on the past and cannot be computed at these rows"), std::string::npos)
       << few.err;
+}
+
+// A load of 60 % of the torque rings behind its spring at each reversal.
+TEST(DiscoverInTime, AResonanceIsAppliedToOtherRows) {
+  const Folder folder;
+  write_ringing_log(folder, "log", 1);
+  write_ringing_log(folder, "other", 2);
+  const std::string named = " -t u --inputs q,dq,ddq --time t ";
+  ASSERT_EQ(folder.run(discover + "log_s.csv log_m.csv" + named + "-o c.csv --json > found.json").exit_code, 0);
+  const json found = json::parse(llmt::read_file(folder.file("found.json")));
+  EXPECT_EQ(found["effects"][0]["name"], "resonance") << found["effects"];
+  ASSERT_EQ(folder.run(discover + "--apply found.json log_s.csv -o again.csv").exit_code, 0);
+  EXPECT_LT((column(folder, "again.csv", "u_corrected") - column(folder, "c.csv", "u_corrected")).cwiseAbs().maxCoeff(),
+            1e-6);
+  const json gaps = json::parse(folder.run(discover + "--apply found.json other_s.csv other_m.csv --json").out);
+  EXPECT_LT(gaps["gap"][0]["after"].get<double>(), 0.4 * gaps["gap"][0]["before"].get<double>());
+}
+
+TEST(DiscoverInTime, RowsThatDoNotBelongTogetherAreNotCompared) {
+  const Folder folder;
+  write_log(folder, "log", 1, 300, 0.012, 0.0, 1);
+  write_log(folder, "other", 1, 300, 0.012, 0.0, 2);
+  folder.run("awk -F, -v OFS=, 'NR > 1 { $1 = 1000 * $1 } 1' other_s.csv > ms.csv");
+  folder.run("awk -F, -v OFS=, 'NR == 9 { $1 = 0.12 } 1' other_s.csv > twice.csv");
+  folder.run("(head -1 log_m.csv; sed 1d log_m.csv | tac) > backwards.csv");
+  ASSERT_EQ(folder.run(discover + "log_s.csv log_m.csv" + in_time + "--json > found.json").exit_code, 0);
+  struct Case {
+    std::string arguments;
+    std::string message;
+  };
+  const std::vector<Case> cases = {
+      {"log_s.csv backwards.csv", "rows must stand in the same order in both files"},
+      {"twice.csv -o o.csv",
+       "found.json: the term delay depends on when the rows were taken, but data rows 7 and 8 have the time 0.12; rows "
+       "of a run are taken one after the other"},
+      {"ms.csv -o o.csv",
+       "found.json: the term delay was found in rows that are 0.0200 apart; these are 20.0 apart: times must have the "
+       "unit of the search"},
+  };
+  for (const Case& entry : cases) {
+    const Outcome outcome = folder.run(discover + "--apply found.json " + entry.arguments);
+    EXPECT_EQ(outcome.exit_code, 1) << entry.arguments << outcome.out;
+    EXPECT_NE(outcome.err.find(entry.message), std::string::npos) << entry.arguments << "\n" << outcome.err;
+  }
 }
 
 TEST(DiscoverInTime, ACommandGetsTimesAndRuns) {

@@ -90,8 +90,8 @@ TEST(RobotWords, UnitsThatWouldFitAreNamed) {
       const std::string text = said(command, table);
       EXPECT_NE(text.find("WARNING: " + words), std::string::npos) << command << ": " << words << "\n" << text;
     };
-    expect(sample(1.0, "deg", 1.0, "mm"), "most likely the angles of the file are radians, not degrees");
-    expect(sample(57.29577951308232, "rad", 1.0, "mm"), "most likely the angles of the file are degrees, not radians");
+    expect(sample(1.0, "deg", 1.0, "mm"), "most likely the angles of the table are radians, not degrees");
+    expect(sample(57.29577951308232, "rad", 1.0, "mm"), "most likely the angles of the table are degrees, not radians");
     expect(sample(1.0, "rad", 0.001, "mm"), "most likely the measured positions are metres, not millimetres");
     expect(sample(1.0, "rad", 1.0, "m"), "most likely the measured positions are millimetres, not metres");
     EXPECT_EQ(said(command, sample(1.0, "rad", 0.001, "m")).find("WARNING"), std::string::npos) << command;

@@ -213,7 +213,7 @@ def in_metres(arm):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda arm, of: (arm, of.assign(**np.degrees(of[JOINTS]))), "the angles of the file are degrees, not radians"),
+        (lambda arm, of: (arm, of.assign(**np.degrees(of[JOINTS]))), "the angles of the table are degrees, not radians"),
         (lambda arm, of: (arm, of.assign(**{n: of[n] / 1e3 for n in POINT})), "the measured positions are metres"),
         (lambda arm, of: (arm, of.assign(q2_rad=-of["q2_rad"])), "joint2 counts in the other direction"),
         (lambda arm, of: (arm, of.assign(q2_rad=of["q3_rad"], q3_rad=of["q2_rad"])), "joint2 and joint3 are exchanged"),

@@ -428,6 +428,8 @@ def _in_time(time: Any, groups: Any, n: int, has_order: bool) -> tuple[list[floa
         return [], []
     if has_order:
         raise ValueError("time says the order of the rows: order is not needed beside it")
+    if np.asarray(time).dtype.kind in "mM":
+        raise ValueError("time holds dates: give numbers, such as (time - time[0]).dt.total_seconds()")
     instants = np.asarray(time, dtype=float)
     labels = np.zeros(n) if groups is None else np.asarray(groups)
     for name, values in (("time", instants), ("groups", labels)):
@@ -484,7 +486,7 @@ def discover(
     order : str
         Column that says in which order rows were measured; by default as they stand.
     time : n numbers
-        When each row was taken, for rows of a log: they are averaged over blocks, whole stretches are set aside, and
+        When each row was taken, in any unit, each time once in a recording, for rows of a log: they are averaged over blocks, whole stretches are set aside, and
         noise that is alike in neighbouring rows is no evidence. Smooth inputs are taken for a log without it.
     groups : n labels
         The recording that each row is of; with ``time``.

@@ -47,8 +47,11 @@ class Found:
         ``inputs`` is a table or array with the columns :attr:`inputs`, ``simulated`` the outputs there. Where parameters
         of the simulation change, either ``derivatives`` has the derivatives of the outputs by each of them at these
         rows, or ``parameters_are_set`` says that ``simulated`` was computed with their new values. ``time`` and
-        ``groups`` are those of the rows, as :func:`llmt.discover` takes them: a delay or a spring in the drive depends
-        on the past of a run.
+        ``groups`` are those of the rows, as :func:`llmt.discover` takes them, n numbers in the unit of the search and n
+        labels: a delay, a spring in the drive or a resonance depends on the past of a run.
+
+        Raises ValueError for other shapes or columns, for times that such a term cannot do with (none, equal ones in a
+        run, another unit), and where a term is not finite at a row.
         """
         from llmt import _core
         from llmt._discover import _in_order, _in_order_of_outputs, _in_time, _is_table, _matrix

@@ -46,8 +46,8 @@ void require_poses_for_folds(const CalibrationRun& run) {
   const Eigen::Index poses =
       labels.empty() ? run.measurements.count() : std::ssize(std::set<double>(labels.begin(), labels.end()));
   if (poses < run.task.options.folds) {
-    throw std::runtime_error(
-        fmt::format("{}: {} poses do not make {} folds", run.task.data_file, poses, run.task.options.folds));
+    throw std::runtime_error(fmt::format("{}: {} {} for {} folds", run.task.data_file, poses,
+                                         poses == 1 ? "pose is too few" : "poses are too few", run.task.options.folds));
   }
 }
 

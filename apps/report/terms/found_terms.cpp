@@ -55,10 +55,9 @@ void read_terms(const Json& json, FoundTerms& found) {
     term.output = output_place(found, effect.at("output").get<std::string>());
     term.expression = text_of(effect.at("expression"));
     for (const Json& parameter : effect.at("parameters")) {
-      term.coefficients.push_back(parameter.at("value").get<double>());
+      term.values.push_back(parameter.at("value").get<double>());
     }
-    if (term.coefficients.empty())
-      throw std::runtime_error(fmt::format("{}: {} has no values", found.file, term.title));
+    if (term.values.empty()) throw std::runtime_error(fmt::format("{}: {} has no values", found.file, term.title));
     term.is_inner_state = effect.contains("inner_state") && term.expression.empty();
     found.terms.push_back(std::move(term));
   }
@@ -90,25 +89,56 @@ void check_words(const FoundTerms& found) {
   }
 }
 
-// Values of a term of the past at all rows. `outputs`: without terms.
-Eigen::VectorXd inner_state(const FoundTerms& found, const FoundTerms::Term& term, const discovery::Inputs& inputs,
-                            const Eigen::MatrixXd& outputs) {
-  if (inputs.instants.size() == 0 && !found.time.empty()) {
+// Terms of the past need times as those of the search.
+void check_times(const FoundTerms& found, const FoundTerms::Term& term, const discovery::Inputs& inputs) {
+  if (inputs.instants.size() == 0) {
+    if (found.time.empty()) return;  // neither had the search
     throw std::runtime_error(
         fmt::format("{}: the term {} depends on when the rows were taken, which is not given", found.file, term.title));
   }
+  const discovery::Rows rows = discovery::rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < rows.sequence.size(); ++k) {
+    const Eigen::Index one = rows.sequence[k - 1];
+    const Eigen::Index next = rows.sequence[k];
+    if (!inputs.runs.empty() && inputs.runs[one] != inputs.runs[next]) continue;
+    steps.push_back(inputs.instants(next) - inputs.instants(one));
+    if (steps.back() > 0.0) continue;
+    throw std::runtime_error(
+        fmt::format("{}: the term {} depends on when the rows were taken, but data rows {} and {} have the time {}; "
+                    "rows of a run are taken one after the other",
+                    found.file, term.title, one + 1, next + 1, inputs.instants(next)));
+  }
+  if (steps.empty() || !(found.step > 0.0)) return;
+  std::ranges::nth_element(steps, steps.begin() + std::ssize(steps) / 2);
+  const double step = steps[steps.size() / 2];
+  constexpr double another_unit = 50.0;
+  if (step > another_unit * found.step || found.step > another_unit * step) {
+    throw std::runtime_error(
+        fmt::format("{}: the term {} was found in rows that are {} apart; these are {} apart: times must have the unit "
+                    "of the search",
+                    found.file, term.title, number(found.step, 3), number(step, 3)));
+  }
+}
+
+// Values of a term of the past at all rows. `outputs`: without terms.
+Eigen::VectorXd inner_state(const FoundTerms& found, const FoundTerms::Term& term, const discovery::Inputs& inputs,
+                            const Eigen::MatrixXd& outputs) {
+  check_times(found, term, inputs);
   const std::vector<std::string> names = found.output_names();
   for (const discovery::ModelTerm& known : discovery::inner_state_terms(inputs, outputs, names)) {
+    const auto coefficients = std::ssize(known.coefficients);
+    const auto constants = std::ssize(known.constants);
     const bool is_this = known.family == term.family && known.location == term.location &&
-                         known.output == names[term.output] && known.coefficients.size() == term.coefficients.size();
+                         known.output == names[term.output] && std::ssize(term.values) == coefficients + constants;
     if (!is_this) continue;
     const Eigen::VectorXd base = outputs.col(static_cast<Eigen::Index>(term.output));
-    const Eigen::Map<const Eigen::VectorXd> coefficients(term.coefficients.data(), std::ssize(term.coefficients));
-    return known.columns(discovery::rows_of(inputs, base), {}) * coefficients;
+    const Eigen::Map<const Eigen::VectorXd> values(term.values.data(), coefficients + constants);
+    return known.columns(discovery::rows_of(inputs, base), values.tail(constants)) * values.head(coefficients);
   }
   throw std::runtime_error(
       fmt::format("{}: the term {} depends on the past and cannot be computed at these rows: it needs 60 rows or more, "
-                  "in which positions, speeds and accelerations can be told by their times",
+                  "the times of which tell derivatives",
                   found.file, term.title));
 }
 
@@ -123,7 +153,7 @@ Eigen::VectorXd values_of(const FoundTerms& found, const FoundTerms::Term& term,
     }
     for (const discovery::ModelTerm& known : discovery::row_before_terms(inputs, term.location)) {
       if (known.family == term.family) {
-        return term.coefficients.front() * known.columns(discovery::rows_of(inputs, base), {}).col(0);
+        return term.values.front() * known.columns(discovery::rows_of(inputs, base), {}).col(0);
       }
     }
   }
@@ -194,6 +224,7 @@ FoundTerms found_terms(const Json& json, const std::string& file) {
     if (json.contains("time")) {
       found.time = json["time"].value("column", "");
       found.group = json["time"].value("group", "");
+      found.step = json["time"].value("step", 0.0);
     }
     for (const Json& parameter : json.at("parameters")) read_parameter(parameter, found);
     read_terms(json, found);

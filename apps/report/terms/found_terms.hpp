@@ -33,7 +33,7 @@ struct FoundTerms {
     std::string location;
     std::size_t output = 0;
     std::string expression;  ///< of the whole term; empty: there is none, as for terms of the row before
-    std::vector<double> coefficients;
+    std::vector<double> values;  ///< coefficients, then constants
     bool is_inner_state = false;  ///< it depends on the past of signals
   };
   struct Change {
@@ -48,6 +48,7 @@ struct FoundTerms {
   std::string order;  ///< as discovery::Inputs::order
   std::string time;   ///< column with the times of rows in time; may be empty
   std::string group;  ///< column with their runs; may be empty
+  double step = 0.0;  ///< of the times of the search; 0: not known
   std::vector<Term> terms;
   std::vector<Change> changes;  ///< of parameters of the simulation
 
@@ -69,7 +70,9 @@ FoundTerms found_terms(const Json& json, const std::string& file);
 
 /// The simulated outputs (n x d) with what was found, at the rows of inputs (columns as in FoundTerms::inputs).
 /// `derivatives`: n x d by each parameter, as far as its change is to be added. `times`: for terms of the past. Throws
-/// std::runtime_error that names a term without an expression, or one that is not finite at a row.
+/// std::runtime_error that names a term without an expression, one that is not finite at a row, or one of the past that
+/// times do not allow: none, equal ones within a run, or a step more than 50 times that of the search or less than a
+/// fiftieth, as of another unit.
 Eigen::MatrixXd apply(const FoundTerms& found, const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simulated,
                       const std::map<std::string, Eigen::MatrixXd>& derivatives = {}, const RowTimes& times = {});
 

@@ -74,9 +74,8 @@ std::string inner_state_text(const discovery::Missing& missing) {
   for (const discovery::FoundTerm& found : missing.found) {
     if (found.inner_state.empty()) continue;
     const discovery::TermValue& value = found.values.front();
-    text += fmt::format("{}{}{} ({} {} +- {} {})", sign, found.inner_state,
-                        missing.gaps.size() > 1 ? " of " + found.output : "", value.name, number(value.value),
-                        number(value.standard_error, 2), value.unit);
+    text += fmt::format("{}{}{} ({})", sign, found.inner_state, missing.gaps.size() > 1 ? " of " + found.output : "",
+                        value_text(value));
     if (shown_by.find(found.shown_by) == std::string::npos) {
       shown_by += (shown_by.empty() ? "" : "; ") + found.shown_by;
     }

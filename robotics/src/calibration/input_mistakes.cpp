@@ -57,9 +57,9 @@ void add_units(const Chain& chain, std::vector<Change>& changes) {
       if (with_tool) meant.tool.xyz_mm *= factor;
     };
   };
-  changes.push_back({turn(degrees), "the angles of the file are radians, not degrees (end their columns with _rad)"});
+  changes.push_back({turn(degrees), "the angles of the table are radians, not degrees (end their columns with _rad)"});
   changes.push_back(
-      {turn(1.0 / degrees), "the angles of the file are degrees, not radians (end their columns with _deg)"});
+      {turn(1.0 / degrees), "the angles of the table are degrees, not radians (end their columns with _deg)"});
   changes.push_back({as_it_stands, "the angles of the description are radians, not degrees", described_turn(degrees)});
   changes.push_back(
       {as_it_stands, "the angles of the description are degrees, not radians", described_turn(1.0 / degrees)});

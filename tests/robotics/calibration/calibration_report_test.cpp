@@ -125,6 +125,13 @@ TEST(CalibrationReport, ACalibrationWithoutGainOnUnseenPosesIsSaid) {
                                "description, or measure more poses"});
 }
 
+// The last of the mistakes named; empty: none.
+std::string last_mistake(const Robot& described, const Measurements& seen) {
+  const std::vector<std::string> found =
+      input_mistakes(described, seen, report_calibration(described, seen, {.folds = 0}));
+  return found.empty() ? std::string() : found.back();
+}
+
 TEST(CalibrationReport, UnitsThatWouldFitAreNamed) {
   const Robot truth = perturbed(ur_like(), 0.5, 0.05, 25);
   const Measurements right = measure(truth, random_poses(truth.chain, 60, 26), 0.05, 27);
@@ -132,14 +139,12 @@ TEST(CalibrationReport, UnitsThatWouldFitAreNamed) {
     Measurements wrong = right;
     wrong.poses.joints *= of_angles;
     wrong.positions_mm *= of_positions;
-    const std::vector<std::string> found =
-        input_mistakes(ur_like(), wrong, report_calibration(ur_like(), wrong, {.folds = 0}));
-    return found.empty() ? std::string() : found.back();
+    return last_mistake(ur_like(), wrong);
   };
   constexpr double degree = std::numbers::pi / 180.0;
   EXPECT_EQ(said_of(1.0, 1.0), "");
-  EXPECT_EQ(said_of(degree, 1.0).find("most likely the angles of the file are radians, not degrees"), 0U);
-  EXPECT_EQ(said_of(1.0 / degree, 1.0).find("most likely the angles of the file are degrees, not radians"), 0U);
+  EXPECT_EQ(said_of(degree, 1.0).find("most likely the angles of the table are radians, not degrees"), 0U);
+  EXPECT_EQ(said_of(1.0 / degree, 1.0).find("most likely the angles of the table are degrees, not radians"), 0U);
   EXPECT_EQ(said_of(1.0, 1e-3).find("most likely the measured positions are metres, not millimetres"), 0U);
   EXPECT_EQ(said_of(1.0, 1e3).find("most likely the measured positions are millimetres, not metres"), 0U);
   EXPECT_EQ(said_of(1.0, 1.5).find("most likely"), std::string::npos);  // no unit
@@ -154,8 +159,7 @@ TEST(CalibrationReport, UnitsOfTheDescriptionThatWouldFitAreNamed) {
       for (double* angle : {&joint.alpha_deg, &joint.theta_deg, &joint.beta_deg}) *angle *= of_angles;
       for (double* length : {&joint.a_mm, &joint.d_mm, &joint.b_mm}) *length *= of_lengths;
     }
-    const std::vector<std::string> found = input_mistakes(wrong, seen, report_calibration(wrong, seen, {.folds = 0}));
-    return found.empty() ? std::string() : found.back();
+    return last_mistake(wrong, seen);
   };
   constexpr double degree = std::numbers::pi / 180.0;
   EXPECT_EQ(said_of(1.0, 1.0), "");

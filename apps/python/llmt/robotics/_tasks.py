@@ -264,6 +264,12 @@ def discover(
         Relative standard deviation of the described masses.
     report
         HTML file to write.
+
+    Raises
+    ------
+    ValueError
+        Also where the calibrated robot misses the points by so much that no effect explains it. Then one mistake after
+        another is tried, as by :func:`calibrate`, and the one that would explain it is named.
     """
     arm = _robot_of(robot)
     effects: Source | None = None

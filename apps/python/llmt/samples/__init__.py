@@ -18,13 +18,15 @@ __all__ = ["arm", "arm_measured", "arm_true", "heat_pump", "path"]
 
 
 def path(name: str) -> Path:
-    """The file of a sample: ``heat_pump.csv``, ``arm.yaml``, ``arm.urdf``, ``arm_true.yaml``, ``arm_measured.csv``."""
+    """The file of a sample: ``heat_pump.csv``, ``arm.yaml``, ``arm.urdf``, ``arm_true.yaml``, ``arm_measured.csv``.
+
+    Raises FileNotFoundError, which lists the samples, for another name.
+    """
     folder = Path(__file__).parent
-    found = folder / name
-    if not found.is_file():
-        there = ", ".join(sorted(file.name for file in folder.iterdir() if file.suffix in (".csv", ".urdf", ".yaml")))
-        raise FileNotFoundError(f"there is no sample {name!r}; there are {there}")
-    return found
+    there = sorted(file.name for file in folder.iterdir() if file.suffix in (".csv", ".urdf", ".yaml"))
+    if name not in there:
+        raise FileNotFoundError(f"there is no sample {name!r}; there are {', '.join(there)}")
+    return folder / name
 
 
 def heat_pump() -> tuple[Any, Any]:

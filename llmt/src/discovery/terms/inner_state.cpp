@@ -41,7 +41,7 @@ class OfRows {
 ModelTerm delay(const std::shared_ptr<OfRows>& of_rows, const std::string& output) {
   return {.family = "delay",
           .location = "",
-          .formula = "-delay d(simulated output)/dt",
+          .formula = "-d(simulated output)/dt",
           .inputs = {},
           .coefficients = {"delay"},
           .columns = [of_rows](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
@@ -60,7 +60,7 @@ ModelTerm resonance(const std::string& output, std::vector<double> frequencies) 
   return {.family = "resonance",
           .location = "",
           .formula =
-              "-share (simulated output - H simulated output), H = (2 z w p + w^2)/(p^2 + 2 z w p + w^2), "
+              "(H - 1) simulated output, H = (2 z w p + w^2)/(p^2 + 2 z w p + w^2), "
               "w = 2 pi frequency, z = damping ratio, p = d/dt",
           .inputs = {},
           .coefficients = {"share"},

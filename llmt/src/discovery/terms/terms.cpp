@@ -1,7 +1,6 @@
 #include "llmt/discovery/terms.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -223,28 +222,6 @@ ModelTerm function_term(const InputView& input, std::string family, std::string 
           .code = {std::move(code)}};
 }
 
-std::vector<ModelTerm> of_families(std::vector<ModelTerm> terms, const std::vector<std::string>& only,
-                                   const std::vector<std::string>& without) {
-  std::set<std::string> families;
-  for (const ModelTerm& term : terms) {
-    if (!term.generic) families.insert(term.family);
-  }
-  for (const std::vector<std::string>* names : {&only, &without}) {
-    for (const std::string& name : *names) {
-      if (families.contains(name)) continue;
-      throw std::invalid_argument(
-          fmt::format("there is no family \"{}\" among the terms to try: {}", name, fmt::join(families, ", ")));
-    }
-  }
-  const auto among = [](const std::vector<std::string>& names, const std::string& family) {
-    return std::ranges::find(names, family) != names.end();
-  };
-  std::erase_if(terms, [&](const ModelTerm& term) {
-    return !term.generic && ((!only.empty() && !among(only, term.family)) || among(without, term.family));
-  });
-  return terms;
-}
-
 ModelTerm own_term(std::string name, std::string formula, std::function<double(const Eigen::VectorXd& row)> function) {
   return {.family = std::move(name),
           .location = "",
@@ -294,25 +271,6 @@ std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string&
   return sequence_terms(view(inputs, place - inputs.names.begin()), inputs.order);
 }
 
-std::vector<ModelTerm> without_duplicates(std::vector<ModelTerm> library, const std::vector<ModelTerm>& own,
-                                          const Rows& rows) {
-  constexpr double rounding = 1e-12;
-  const auto direction = [&](const ModelTerm& term) -> Eigen::VectorXd {
-    if (term.coefficients.size() != 1 || !term.constants.empty() || term.generic) return {};
-    const Eigen::MatrixXd columns = term.columns(rows, {});
-    return columns.col(0).norm() > 0.0 ? Eigen::VectorXd(columns.col(0).normalized()) : Eigen::VectorXd();
-  };
-  std::vector<Eigen::VectorXd> taken;
-  for (const ModelTerm& term : own) taken.push_back(direction(term));
-  std::erase_if(library, [&](const ModelTerm& term) {
-    const Eigen::VectorXd mine = direction(term);
-    return mine.size() > 0 && std::ranges::any_of(taken, [&](const Eigen::VectorXd& other) {
-             return other.size() > 0 && 1.0 - std::abs(mine.dot(other)) < rounding;
-           });
-  });
-  return library;
-}
-
 Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
   check(inputs);
   const Eigen::Index n = inputs.values.rows();
@@ -330,6 +288,13 @@ Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
     std::ranges::stable_sort(rows.sequence, {}, [&](Eigen::Index i) {
       return std::pair(inputs.runs.empty() ? Eigen::Index{0} : inputs.runs[i], rows.instants(i));
     });
+    // A run begins at 0, because a clock may go on from one run to the next.
+    Eigen::Index first = 0;
+    for (Eigen::Index k = 0; k < n && !inputs.runs.empty(); ++k) {
+      const Eigen::Index row = rows.sequence[k];
+      if (k == 0 || inputs.runs[row] != inputs.runs[rows.sequence[k - 1]]) first = row;
+      rows.instants(row) = inputs.instants(row) - inputs.instants(first);
+    }
     return rows;
   }
   if (inputs.order.empty()) return rows;
