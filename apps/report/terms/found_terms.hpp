@@ -32,8 +32,8 @@ struct FoundTerms {
     std::string family;
     std::string location;
     std::size_t output = 0;
-    std::string expression;  ///< of the whole term; empty: there is none, as for terms of the row before
-    std::vector<double> values;  ///< coefficients, then constants
+    std::string expression;       ///< of the whole term; empty: there is none, as for terms of the row before
+    std::vector<double> values;   ///< coefficients, then constants
     bool is_inner_state = false;  ///< it depends on the past of signals
   };
   struct Change {

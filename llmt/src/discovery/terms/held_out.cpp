@@ -42,8 +42,9 @@ TermFit fit_without(const TermModel& model, const TermData& kept, const TermFit&
 
 // Terms that change samples by C, a sum of squares in units of the variance of the noise, should shrink the sum of
 // squares there by C, with a standard deviation of 2 sqrt(C). Where only a share of the samples is independent, both
-// sums are of that share. Errors of the inputs make C larger on average, and what is left; both are taken off. By chance
-// they change what is left with a standard deviation of 2 sqrt(errors): twice that does not say that a term is wrong.
+// sums are of that share. Errors of the inputs make C larger on average, and what is left; both are taken off. By
+// chance they change what is left with a standard deviation of 2 sqrt(errors): twice that does not say that a term is
+// wrong.
 struct Judgement {
   double change = 0.0;
   double shrunk = 0.0;
