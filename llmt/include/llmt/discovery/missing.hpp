@@ -52,8 +52,9 @@ struct TermValue {
 };
 
 struct RivalTerms {
-  std::string what;    ///< "cube a", joined by " + " where it takes several
-  bool exact = false;  ///< the same at every row: these rows cannot distinguish them
+  std::string what;                 ///< "cube a", joined by " + " where it takes several
+  std::vector<std::string> inputs;  ///< of these terms
+  bool exact = false;               ///< the same at every row: these rows cannot distinguish them
 };
 
 /// A term that is missing.

@@ -68,4 +68,37 @@ Missing Alternatives::plain_for_searched(Missing found) const {
   return found;
 }
 
+Missing Alternatives::inputs_for_gain(Missing found) const {
+  const auto is_gain = [](const FoundTerm& term) { return term.family == "gain"; };
+  if (!has_judges(found) || found.answer == Answer::inner_state || std::ranges::none_of(found.found, is_gain)) {
+    return found;
+  }
+  const Missing of_inputs = without(*refuted_, [](const ModelTerm& term) {
+    return term.generic || term.family == "gain" || term.family == "gain_curvature" || term.family == "load_friction";
+  });
+  constexpr double as_little = 1.02;
+  if (of_inputs.answer == Answer::failed_held_out ||
+      left_on_held_out(of_inputs) > as_little * left_on_held_out(found)) {
+    return found;
+  }
+  const std::vector<FoundTerm> beside = found.found;
+  for (FoundTerm& gain : found.found) {
+    if (!is_gain(gain)) continue;
+    RivalTerms rival;
+    for (const FoundTerm& term : of_inputs.found) {
+      const bool is_shared = std::ranges::any_of(beside, [&](const FoundTerm& other) {
+        return other.term == term.term && other.output_index == term.output_index;
+      });
+      if (is_shared || term.output_index != gain.output_index) continue;
+      rival.what +=
+          (rival.what.empty() ? "" : " + ") + term.family + (term.location.empty() ? "" : " " + term.location);
+      rival.inputs.insert(rival.inputs.end(), term.inputs.begin(), term.inputs.end());
+    }
+    if (rival.what.empty()) continue;
+    gain.rivals.insert(gain.rivals.begin(), rival);
+    if (found.answer == Answer::named) found.answer = Answer::indistinguishable;
+  }
+  return found;
+}
+
 }  // namespace llmt::discovery

@@ -37,6 +37,10 @@ class Alternatives {
   /// place do not seem to be worth their cost. Where terms without constants leave clearly less, they are the answer.
   Missing plain_for_searched(Missing found) const;
 
+  /// Changes of an inertia and of friction together change the output by almost a share of it. Where terms of the
+  /// inputs leave as little as a gain does, they become a rival of it.
+  Missing inputs_for_gain(Missing found) const;
+
  private:
   const Simulation* simulation_;
   const Inputs* inputs_;

@@ -203,6 +203,23 @@ InputNoise::AddedByErrors InputNoise::added(const TermData& data, const std::vec
   return {sum.change / draws, sum.left / draws};
 }
 
+namespace {
+
+// Covariance of estimates, in units of the variance of the samples: the sandwich inverse S inverse', S the sum of the
+// squares of the samples' `scores` (Carroll et al. 2006, appendix A.6). Errors of an input count where the model is
+// steep in it, so samples do not scatter alike.
+Eigen::MatrixXd sandwich(const Eigen::LDLT<Eigen::MatrixXd>& inverse, const Eigen::MatrixXd& scores,
+                         Eigen::Index outputs, double variance) {
+  const Eigen::Index samples = scores.rows() / outputs;
+  Eigen::MatrixXd of_samples = Eigen::MatrixXd::Zero(samples, scores.cols());
+  for (Eigen::Index i = 0; i < scores.rows(); ++i) of_samples.row(i / outputs) += scores.row(i);
+  of_samples.rowwise() -= of_samples.colwise().mean().eval();
+  const Eigen::MatrixXd squares = of_samples.transpose() * of_samples / variance;
+  return inverse.solve(inverse.solve(squares).transpose());
+}
+
+}  // namespace
+
 std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit) const {
   constexpr int steps = 2;
   std::vector<std::string> beyond;
@@ -218,12 +235,13 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
     const Eigen::VectorXd predicted = stacked(data, model_->predict(moved.parameters, moved.placed));
     const Eigen::MatrixXd gram = own.transpose() * own;
     Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(own.cols(), own.cols());
-    Eigen::VectorXd moments = own.transpose() * scaled_residuals(*model_, data, moved.parameters, moved.placed);
+    const Eigen::VectorXd residuals = scaled_residuals(*model_, data, moved.parameters, moved.placed);
+    Eigen::MatrixXd scores = own.array().colwise() * residuals.array();
     for (const std::shared_ptr<const Draw>& draw : draws_) {
       const Eigen::MatrixXd other = jacobian(*draw->model, data, moved);
       const Eigen::VectorXd change = stacked(data, draw->model->predict(moved.parameters, moved.placed)) - predicted;
       errors += (other - own).transpose() * (other - own) / static_cast<double>(draws_.size());
-      moments += other.transpose() * change / static_cast<double>(draws_.size());
+      scores.array() += (other.array().colwise() * change.array()) / static_cast<double>(draws_.size());
     }
     constexpr double most = 0.5;
     const bool is_hopeless = (errors.diagonal().array() > most * gram.diagonal().array()).any();
@@ -239,8 +257,9 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
       }
       return beyond;
     }
-    const Eigen::VectorXd change = inverse.solve(moments);
-    const Eigen::MatrixXd spread = inverse.solve(inverse.solve(gram).transpose());
+    const Eigen::VectorXd change = inverse.solve(scores.colwise().sum().transpose());
+    const auto dof = static_cast<double>(std::max<Eigen::Index>(1, own.rows() - own.cols()));
+    const Eigen::MatrixXd spread = sandwich(inverse, scores, data.measured.cols(), residuals.squaredNorm() / dof);
     factors = (spread.diagonal().array() /
                gram.ldlt().solve(Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).diagonal().array())
                   .sqrt();

@@ -41,8 +41,9 @@ class InputNoise {
 
   /// Estimates and standard errors of a fit corrected for the errors: steps (J'J - D)^-1 (J'r + g), D = E[dJ'dJ] and
   /// g = E[J'dy], where J is the Jacobian of the fit and dJ, dy are the changes of J and of the prediction that drawn
-  /// errors make (Fuller 1987, section 3.1). Returns the names of parameters and terms that cannot be corrected,
-  /// because more than half of what determines them are errors; these keep their values.
+  /// errors make (Fuller 1987, section 3.1). Standard errors are those of the sandwich of the samples' scores. Returns
+  /// the names of parameters and terms that cannot be corrected, because more than half of what determines them are
+  /// errors; these keep their values.
   std::vector<std::string> correct(const TermData& data, TermFit& fit) const;
 
   /// d: share of the variance of the simulation that the surrogate describes.

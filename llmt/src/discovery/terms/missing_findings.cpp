@@ -61,11 +61,26 @@ std::string kind_of(const FoundTerm& found) {
   return found.family == "sign" || found.family == "linear" ? "dry and viscous" : found.family;
 }
 
-// Whether another function of the same input explains as well in the place of a term.
-bool has_rival_in_place(const FoundTerm& found) {
+bool has_rival_of(const FoundTerm& found, const std::string& input) {
   return std::ranges::any_of(found.rivals, [&](const RivalTerms& rival) {
-    return rival.what.find(" " + found.location) != std::string::npos;
+    return std::ranges::find(rival.inputs, input) != rival.inputs.end();
   });
+}
+
+// Inputs and output of a term. One without inputs, as an offset is, stands in time also where a function of one input
+// would explain as well in its place.
+using Place = std::pair<std::vector<std::string>, Eigen::Index>;
+std::vector<Place> places_of(const FoundTerm& found, bool in_time) {
+  constexpr std::size_t most_inputs = 2;
+  if (!found.inputs.empty()) {
+    if (found.inputs.size() > most_inputs) return {};
+    return {{sorted_inputs(found), found.output_index}};
+  }
+  std::vector<Place> places;
+  for (const RivalTerms& rival : found.rivals) {
+    if (in_time && rival.inputs.size() == 1) places.emplace_back(rival.inputs, found.output_index);
+  }
+  return places;
 }
 
 // Terms that together may only approximate another function: three or more kinds of one input (in time, two of which
@@ -74,25 +89,34 @@ std::vector<bool> approximations(const std::vector<FoundTerm>& all, bool in_time
   // Terms of one input are counted by kinds, as there may be several steps. A product and a square times the other
   // input are as much of a power series in two inputs as the terms have.
   constexpr std::array<std::size_t, 2> too_many = {3, 2};
-  using Place = std::pair<std::vector<std::string>, Eigen::Index>;
-  const auto place_of = [](const FoundTerm& found) { return Place{sorted_inputs(found), found.output_index}; };
-  const auto is_counted = [&](const FoundTerm& found) {
-    return !found.inputs.empty() && found.inputs.size() <= too_many.size();
-  };
   std::map<Place, std::set<std::string>> kinds;
   std::set<Place> uncertain;
   for (const FoundTerm& found : all) {
-    if (!is_counted(found)) continue;
-    if (in_time && found.inputs.size() == 1 && has_rival_in_place(found)) uncertain.insert(place_of(found));
-    kinds[place_of(found)].insert(found.inputs.size() == 1 ? kind_of(found) : found.family + " " + found.location);
+    for (const Place& place : places_of(found, in_time)) {
+      const std::vector<std::string>& inputs = place.first;
+      if (in_time && inputs.size() == 1 && has_rival_of(found, inputs.front())) uncertain.insert(place);
+      kinds[place].insert(inputs.size() == 1 ? kind_of(found) : found.family + " " + found.location);
+    }
   }
   std::vector<bool> approximate;
   for (const FoundTerm& found : all) {
-    const std::size_t fewer = uncertain.contains(place_of(found)) ? 1 : 0;
-    approximate.push_back(is_counted(found) &&
-                          kinds[place_of(found)].size() + fewer >= too_many[found.inputs.size() - 1]);
+    approximate.push_back(std::ranges::any_of(places_of(found, in_time), [&](const Place& place) {
+      return kinds[place].size() + (uncertain.contains(place) ? 1 : 0) >= too_many[place.first.size() - 1];
+    }));
   }
   return approximate;
+}
+
+// The coefficient of a term with a constant whose interval of 95 % reaches farther than a quarter of it; -1: none.
+// Noise at the inputs, or few rows where the term lives, leave its size and its shape to each other.
+Eigen::Index uncertain_coefficient(const FoundTerm& found) {
+  constexpr double far = 0.25;
+  constexpr double quantile = 1.96;
+  for (Eigen::Index k = 0; k < found.coefficients.size() && found.constants.size() > 0; ++k) {
+    const TermValue& own = found.values[static_cast<std::size_t>(k)];
+    if (quantile * own.standard_error > far * std::abs(own.value)) return k;
+  }
+  return -1;
 }
 
 }  // namespace
@@ -112,9 +136,14 @@ void describe_findings(const TermModel& model, const Settled& settled, Missing& 
       ++next;
       found.share = term.share;
       for (const Rival& rival : finding.rivals) {
-        std::string what;
-        for (const std::size_t a : rival.candidates) what += (what.empty() ? "" : " + ") + missing.candidates[a];
-        found.rivals.push_back({what, rival.exact});
+        RivalTerms terms{.what = {}, .inputs = {}, .exact = rival.exact};
+        for (const std::size_t a : rival.candidates) {
+          terms.what += (terms.what.empty() ? "" : " + ") + missing.candidates[a];
+          for (const std::string& input : model.terms()[settled.question.options[a].term].inputs) {
+            if (std::ranges::find(terms.inputs, input) == terms.inputs.end()) terms.inputs.push_back(input);
+          }
+        }
+        found.rivals.push_back(std::move(terms));
       }
       missing.found.push_back(std::move(found));
     }
@@ -203,6 +232,16 @@ void decide(Missing& missing, bool in_time) {
     // What stands beside a state, and explains less, may be what the state does beyond its model.
     if (found.inner_state.empty() && found.share < share_of_state) found.confirmed = false;
     if (!found.inner_state.empty() && !is_state(found)) found.confirmed = false;
+    const Eigen::Index loose = in_time && found.inner_state.empty() ? uncertain_coefficient(found) : -1;
+    if (loose >= 0 && found.confirmed) {
+      const TermValue& own = found.values[static_cast<std::size_t>(loose)];
+      found.confirmed = false;
+      missing.notes.push_back(
+          fmt::format("the {} of {} is {:.3g} with a standard error of {:.2g}: the term is tentative, "
+                      "because its size is not known to a quarter",
+                      own.name, found.location.empty() ? found.family : found.family + " " + found.location, own.value,
+                      own.standard_error));
+    }
     if (!approximate[k] || !noted.insert(sorted_inputs(found)).second) continue;
     missing.notes.push_back(
         fmt::format("there are many terms of {}: together they may approximate one that was not tried",

@@ -148,6 +148,7 @@ Missing find_at(const Simulation& simulation, const Inputs& inputs, const Measur
       missing = alternatives.state_for_terms(std::move(missing));
       missing = alternatives.causes_for_shapes(std::move(missing));
       missing = alternatives.plain_for_searched(std::move(missing));
+      missing = alternatives.inputs_for_gain(std::move(missing));
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
       return missing;
     }
