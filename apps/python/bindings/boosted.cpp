@@ -91,10 +91,7 @@ auto attribute_to_sum(const BoostedModel& self, const Array& inputs, const Array
 auto importance_in_sum(const BoostedModel& self, const Array& inputs, int threads) {
   const Eigen::MatrixXd rows = rows_of(inputs);
   Eigen::MatrixXd shares;
-  {
-    const nb::gil_scoped_release unlocked;
-    shares = importance(self, rows, threads);
-  }
+  interruptible([&](const Progress& progress) { shares = importance(self, rows, threads, progress); }, nb::none());
   return array_of<double>(std::move(shares));
 }
 
@@ -103,10 +100,8 @@ auto partial_dependence_of(const BoostedModel& self, const Array& inputs, Eigen:
   const Eigen::MatrixXd rows = rows_of(inputs);
   const Eigen::VectorXd at = vector_of(values);
   Eigen::MatrixXd means;
-  {
-    const nb::gil_scoped_release unlocked;
-    means = partial_dependence(self, rows, input, at, threads);
-  }
+  interruptible([&](const Progress& progress) { means = partial_dependence(self, rows, input, at, threads, progress); },
+                nb::none());
   return array_of<double>(std::move(means));
 }
 

@@ -95,10 +95,8 @@ auto attribute_rows(const ModelWithIntervals& self, const Array& inputs) {
 auto importance_of(const ModelWithIntervals& self, const Array& inputs, int threads) {
   Eigen::MatrixXd shares;
   const Eigen::MatrixXd rows = rows_of(inputs);
-  {
-    const nb::gil_scoped_release unlocked;
-    shares = importance(self.model, rows, threads);
-  }
+  interruptible([&](const Progress& progress) { shares = importance(self.model, rows, threads, progress); },
+                nb::none());
   return array_of<double>(std::move(shares));
 }
 

@@ -35,9 +35,10 @@ struct Attributions {
 /// v(S) = value [A in S] [B and S disjoint], whose Shapley values are known. The time grows with the background.
 ///
 /// Throws std::invalid_argument if a number of columns differs, a value is infinite, or there is no background. Same
-/// bytes at any number of threads (0: all).
+/// bytes at any number of threads (0: all). Reports to `progress` after each row of the inputs.
 Attributions attribute_rows(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                            const Eigen::Ref<const Eigen::MatrixXd>& background, int max_threads = 0);
+                            const Eigen::Ref<const Eigen::MatrixXd>& background, int max_threads = 0,
+                            const Progress& progress = {});
 
 /// The same of one row.
 Attribution attribute(const BoostedModel& model, const Eigen::Ref<const Eigen::VectorXd>& point,
@@ -53,15 +54,15 @@ inline constexpr Eigen::Index boosted_importance_background = 20;
 
 /// How much each input moves the predictions over a table, outputs x inputs: the mean of |contribution| over rows of
 /// it, against a background of others, both evenly spaced, divided by its sum over the inputs. Rows sum to 1, or are 0
-/// where the prediction does not change. Throws as attribute_rows().
+/// where the prediction does not change. Throws and reports as attribute_rows().
 Eigen::MatrixXd importance(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                           int max_threads = 0);
+                           int max_threads = 0, const Progress& progress = {});
 
 /// Partial dependence (Friedman 2001): the mean prediction over the rows of a table in which one input has the same
 /// value in all of them, values x outputs. Throws std::invalid_argument as BoostedModel::predict(), for a table without
-/// rows and if there is no such input.
+/// rows and if there is no such input. Reports to `progress` after each value.
 Eigen::MatrixXd partial_dependence(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                                    Eigen::Index input, const Eigen::Ref<const Eigen::VectorXd>& values,
-                                   int max_threads = 0);
+                                   int max_threads = 0, const Progress& progress = {});
 
 }  // namespace llmt

@@ -43,7 +43,8 @@ Eigen::MatrixXd contributions_of(const BoostedModel& model, const Eigen::VectorX
 }  // namespace
 
 Attributions attribute_rows(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                            const Eigen::Ref<const Eigen::MatrixXd>& background, int max_threads) {
+                            const Eigen::Ref<const Eigen::MatrixXd>& background, int max_threads,
+                            const Progress& progress) {
   check_table("llmt::attribute", "inputs", model, inputs);
   check_table("llmt::attribute", "background", model, background);
   Attributions result{
@@ -51,10 +52,13 @@ Attributions attribute_rows(const BoostedModel& model, const Eigen::Ref<const Ei
       .reference = model.predict(background, max_threads).colwise().mean().transpose(),
       .contributions = {static_cast<std::size_t>(model.num_outputs()), Eigen::MatrixXd(inputs.rows(), inputs.cols())}};
   const Eigen::MatrixXd rows_of_background = background.transpose();
+  Work work(progress);
   parallel_for(inputs.rows(), max_threads, [&](Eigen::Index row) {
     const Eigen::MatrixXd of_row = contributions_of(model, inputs.row(row).transpose(), rows_of_background);
     for (Eigen::Index o = 0; o < of_row.rows(); ++o) result.contributions[o].row(row) = of_row.row(o);
+    work.did(1.0 / static_cast<double>(inputs.rows()));
   });
+  work.finish();
   return result;
 }
 
@@ -75,11 +79,11 @@ Eigen::MatrixXd background_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs, E
   return rows;
 }
 
-Eigen::MatrixXd importance(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                           int max_threads) {
+Eigen::MatrixXd importance(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads,
+                           const Progress& progress) {
   check_table("llmt::importance", "inputs", model, inputs);
   const Attributions rows = attribute_rows(model, background_of(inputs, boosted_importance_rows),
-                                           background_of(inputs, boosted_importance_background), max_threads);
+                                           background_of(inputs, boosted_importance_background), max_threads, progress);
   Eigen::MatrixXd shares(model.num_outputs(), model.num_inputs());
   for (Eigen::Index o = 0; o < model.num_outputs(); ++o) {
     shares.row(o) = rows.contributions[o].cwiseAbs().colwise().sum();
@@ -92,8 +96,8 @@ Eigen::MatrixXd importance(const BoostedModel& model, const Eigen::Ref<const Eig
 }
 
 Eigen::MatrixXd partial_dependence(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                   Eigen::Index input, const Eigen::Ref<const Eigen::VectorXd>& values,
-                                   int max_threads) {
+                                   Eigen::Index input, const Eigen::Ref<const Eigen::VectorXd>& values, int max_threads,
+                                   const Progress& progress) {
   check_table("llmt::partial_dependence", "inputs", model, inputs);
   if (input < 0 || input >= model.num_inputs()) {
     throw std::invalid_argument(fmt::format("llmt::partial_dependence: there is no input {}, the model has {} inputs",
@@ -101,10 +105,13 @@ Eigen::MatrixXd partial_dependence(const BoostedModel& model, const Eigen::Ref<c
   }
   Eigen::MatrixXd result(values.size(), model.num_outputs());
   Eigen::MatrixXd rows = inputs;
+  Work work(progress);
   for (Eigen::Index k = 0; k < values.size(); ++k) {
     rows.col(input).setConstant(values(k));
     result.row(k) = model.predict(rows, max_threads).colwise().mean();
+    work.did(1.0 / static_cast<double>(values.size()));
   }
+  work.finish();
   return result;
 }
 

@@ -68,7 +68,8 @@ Attribution attribute(const Model& model, const Eigen::Ref<const Eigen::VectorXd
   return attribute(model, point, reference_point(model));
 }
 
-Eigen::MatrixXd importance(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads) {
+Eigen::MatrixXd importance(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads,
+                           const Progress& progress) {
   if (inputs.rows() < 1 || inputs.cols() != model.num_inputs()) {
     throw std::invalid_argument(
         fmt::format("llmt::importance: inputs is {} x {}, it must have a row and the model's {} inputs", inputs.rows(),
@@ -79,9 +80,11 @@ Eigen::MatrixXd importance(const Model& model, const Eigen::Ref<const Eigen::Mat
   const Eigen::VectorXd reference = reference_point(model);
   const Eigen::Index count = std::min(inputs.rows(), importance_rows);
   std::vector<Eigen::MatrixXd> of_row(count);
+  Work work(progress);
   parallel_for(count, max_threads, [&](Eigen::Index k) {
     const Eigen::VectorXd point = inputs.row(k * inputs.rows() / count).transpose();
     of_row[k] = attribute_with(model, evaluators, point, reference, coarse).contributions.cwiseAbs();
+    work.did(1.0 / static_cast<double>(count));
   });
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(model.num_outputs(), model.num_inputs());
   for (const Eigen::MatrixXd& contributions : of_row) {
@@ -93,6 +96,7 @@ Eigen::MatrixXd importance(const Model& model, const Eigen::Ref<const Eigen::Mat
     const double total = sum.row(o).sum();
     sum.row(o) *= total > rounding * static_cast<double>(count) ? 1.0 / total : 0.0;
   }
+  work.finish();
   return sum;
 }
 

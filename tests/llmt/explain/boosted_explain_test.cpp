@@ -123,6 +123,19 @@ TEST(PartialDependence, IsTheMeanOfPredictionsWithOneInputHeld) {
   }
 }
 
+TEST(BoostedAttribution, EndsAtTheRowAtWhichItIsStopped) {
+  const llmt::BoostedModel model = random_boosted::model({.trees = 20}, 5);
+  const Eigen::MatrixXd x = random_boosted::rows(50, 6);
+  int reports = 0;
+  const llmt::Progress stop = [&](const llmt::ProgressReport&) { return ++reports < 4; };
+  EXPECT_THROW(llmt::importance(model, x, 1, stop), llmt::Cancelled);
+  EXPECT_EQ(reports, 4);
+  reports = 0;
+  EXPECT_THROW(llmt::partial_dependence(model, x, 2, Eigen::VectorXd::LinSpaced(9, -1.0, 1.0), 1, stop),
+               llmt::Cancelled);
+  EXPECT_EQ(reports, 4);
+}
+
 void expect_refusal(const std::function<void()>& call, const std::string& words) {
   try {
     call();

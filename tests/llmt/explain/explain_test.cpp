@@ -317,6 +317,20 @@ TEST(Explain, ImportanceIsTheShareOfTheMovedOutput) {
   }
 }
 
+TEST(Explain, ImportanceEndsAtTheRowAtWhichItIsStopped) {
+  const Eigen::MatrixXd x = oracle::uniform(1200, 3, 9);
+  const llmt::Model model = llmt::fit(x, x.col(0)).model;
+  int reports = 0;
+  const auto importance = [&](int most) {
+    reports = 0;
+    return llmt::importance(model, x, 1, [&](const llmt::ProgressReport&) { return ++reports < most; });
+  };
+  EXPECT_THROW(importance(4), llmt::Cancelled);
+  EXPECT_EQ(reports, 4);
+  EXPECT_EQ(importance(100000), llmt::importance(model, x));
+  EXPECT_GE(reports, llmt::importance_rows);
+}
+
 TEST(Explain, RejectsWhatDoesNotFit) {
   const llmt::Model model = four_fields(1.0, {0.0, 1.0, 1.0, 5.0});
   using oracle::thrown;
