@@ -11,76 +11,66 @@ namespace {
 
 constexpr double clearly_less = 0.8;
 
-// Sum over the outputs of the squared errors on the samples set aside, in units of those before.
-double left_on_held_out(const Missing& missing) {
+// Sum over the outputs of the squared errors on the samples set aside, in units of those that `reference` has before
+// its terms. Each search leaves out other outliers, so units of its own would not be comparable.
+double left_on_held_out(const Missing& missing, const Missing& reference) {
   double left = 0.0;
-  for (const Gap& gap : missing.gaps) left += gap.before > 0.0 ? std::pow(gap.after / gap.before, 2.0) : 0.0;
+  for (std::size_t o = 0; o < missing.gaps.size(); ++o) {
+    const double before = reference.gaps[o].before;
+    left += before > 0.0 ? std::pow(missing.gaps[o].after / before, 2.0) : 0.0;
+  }
   return left;
+}
+
+bool is_gain(const FoundTerm& term) { return term.family == "gain"; }
+
+// The logarithm of the ratio of likelihoods of two answers on the rows that both set aside and that are no outliers of
+// both.
+double evidence_against(const Missing& other, const Missing& found, const MeasuredOutputs& measured) {
+  constexpr double far = 5.0;  // noise floors
+  const std::set<Eigen::Index> aside(found.held_out.begin(), found.held_out.end());
+  double evidence = 0.0;
+  for (Eigen::Index o = 0; o < measured.values.cols(); ++o) {
+    double left = 0.0;
+    double left_by_other = 0.0;
+    double rows = 0.0;
+    for (const Eigen::Index row : other.held_out) {
+      if (!aside.contains(row)) continue;
+      const double own = measured.values(row, o) - found.corrected(row, o);
+      const double others = measured.values(row, o) - other.corrected(row, o);
+      if (std::min(std::abs(own), std::abs(others)) > far * found.gaps[static_cast<std::size_t>(o)].noise_floor)
+        continue;
+      left += own * own;
+      left_by_other += others * others;
+      rows += 1.0;
+    }
+    if (left > 0.0) evidence += 0.5 * found.time.independent_share * rows * (left_by_other / left - 1.0);
+  }
+  return evidence;
 }
 
 }  // namespace
 
-Missing Alternatives::without(std::set<std::size_t> refuted,
-                              const std::function<bool(const ModelTerm&)>& left_out) const {
-  for (std::size_t t = 0; t < terms_->size(); ++t) {
-    if (left_out((*terms_)[t])) refuted.insert(t);
-  }
-  return search_once(*simulation_, *inputs_, *measured_, *terms_, *rows_, *options_, refuted);
-}
+bool has_gain(const Missing& missing) { return std::ranges::any_of(missing.found, is_gain); }
 
-Missing Alternatives::state_for_terms(Missing found) const {
-  const auto is_state = [&](std::size_t t) { return !(*terms_)[t].inner_state.empty(); };
-  if (!has_judges(found) || std::ranges::none_of(*refuted_, is_state) || found.answer == Answer::inner_state) {
-    return found;
-  }
-  Missing of_state = without({}, [](const ModelTerm& term) { return term.inner_state.empty(); });
-  const bool holds = of_state.answer == Answer::inner_state && beyond_constants(of_state, *terms_).empty();
-  const bool is_better = holds && left_on_held_out(of_state) < left_on_held_out(found);
-  return is_better ? of_state : found;
-}
-
-Missing Alternatives::causes_for_shapes(Missing found) const {
-  if (!has_judges(found) || std::ranges::none_of(found.found, &FoundTerm::generic)) return found;
-  Missing of_causes = without(*refuted_, [](const ModelTerm& term) { return term.generic; });
-  constexpr double as_little = 1.1;
-  constexpr double immaterial = 0.01;
-  const double left = left_on_held_out(found);
-  const bool is_as_good = of_causes.answer != Answer::failed_held_out && !of_causes.found.empty() &&
-                          left_on_held_out(of_causes) <= std::max(as_little * left, left + immaterial);
-  return is_as_good ? of_causes : found;
-}
-
-Missing Alternatives::plain_for_searched(Missing found) const {
-  if (!has_judges(found) || found.answer == Answer::inner_state) return found;
-  std::set<std::vector<std::string>> places;
-  for (const FoundTerm& term : found.found) {
-    if (!term.generic && term.constants.size() > 0 && term.inputs.size() == 1) places.insert(term.inputs);
-  }
-  for (const std::vector<std::string>& place : places) {
-    Missing plain =
-        without(*refuted_, [&](const ModelTerm& term) { return term.inputs == place && !term.constants.empty(); });
-    const auto holds = [](const FoundTerm& term) { return term.confirmed && !term.generic; };
-    if (!plain.found.empty() && std::ranges::all_of(plain.found, holds) &&
-        left_on_held_out(plain) < clearly_less * left_on_held_out(found)) {
-      found = std::move(plain);
+std::set<std::size_t> shares_of_the_simulation(const std::vector<ModelTerm>& terms) {
+  std::set<std::size_t> shares;
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (terms[t].family == "gain" || terms[t].family == "gain_curvature" || terms[t].family == "load_friction") {
+      shares.insert(t);
     }
   }
-  return found;
+  return shares;
 }
 
-Missing Alternatives::inputs_for_gain(Missing found) const {
-  const auto is_gain = [](const FoundTerm& term) { return term.family == "gain"; };
-  if (!has_judges(found) || found.answer == Answer::inner_state || std::ranges::none_of(found.found, is_gain)) {
+Missing inputs_for_gain(Missing found, Missing of_inputs, const MeasuredOutputs& measured, double rival_margin) {
+  const bool has_shapes = std::ranges::any_of(of_inputs.found, &FoundTerm::generic);
+  if (of_inputs.answer == Answer::failed_held_out || has_shapes ||
+      evidence_against(of_inputs, found, measured) > rival_margin) {
     return found;
   }
-  const Missing of_inputs = without(*refuted_, [](const ModelTerm& term) {
-    return term.generic || term.family == "gain" || term.family == "gain_curvature" || term.family == "load_friction";
-  });
-  constexpr double as_little = 1.02;
-  if (of_inputs.answer == Answer::failed_held_out ||
-      left_on_held_out(of_inputs) > as_little * left_on_held_out(found)) {
-    return found;
-  }
+  const bool is_certain = of_inputs.answer == Answer::named || of_inputs.answer == Answer::indistinguishable;
+  if (is_certain && of_inputs.found.size() < found.found.size()) return of_inputs;
   const std::vector<FoundTerm> beside = found.found;
   for (FoundTerm& gain : found.found) {
     if (!is_gain(gain)) continue;
@@ -97,6 +87,54 @@ Missing Alternatives::inputs_for_gain(Missing found) const {
     if (rival.what.empty()) continue;
     gain.rivals.insert(gain.rivals.begin(), rival);
     if (found.answer == Answer::named) found.answer = Answer::indistinguishable;
+  }
+  return found;
+}
+
+Missing Alternatives::without(std::set<std::size_t> refuted,
+                              const std::function<bool(const ModelTerm&)>& left_out) const {
+  for (std::size_t t = 0; t < terms_->size(); ++t) {
+    if (left_out((*terms_)[t])) refuted.insert(t);
+  }
+  return search_once(*simulation_, *inputs_, *measured_, *terms_, *rows_, *options_, refuted);
+}
+
+Missing Alternatives::state_for_terms(Missing found) const {
+  const auto is_state = [&](std::size_t t) { return !(*terms_)[t].inner_state.empty(); };
+  if (!has_judges(found) || std::ranges::none_of(*refuted_, is_state) || found.answer == Answer::inner_state) {
+    return found;
+  }
+  Missing of_state = without({}, [](const ModelTerm& term) { return term.inner_state.empty(); });
+  const bool holds = of_state.answer == Answer::inner_state && beyond_constants(of_state, *terms_).empty();
+  const bool is_better = holds && left_on_held_out(of_state, found) < left_on_held_out(found, found);
+  return is_better ? of_state : found;
+}
+
+Missing Alternatives::causes_for_shapes(Missing found) const {
+  if (!has_judges(found) || std::ranges::none_of(found.found, &FoundTerm::generic)) return found;
+  Missing of_causes = without(*refuted_, [](const ModelTerm& term) { return term.generic; });
+  constexpr double as_little = 1.1;
+  constexpr double immaterial = 0.01;
+  const double left = left_on_held_out(found, found);
+  const bool is_as_good = of_causes.answer != Answer::failed_held_out && !of_causes.found.empty() &&
+                          left_on_held_out(of_causes, found) <= std::max(as_little * left, left + immaterial);
+  return is_as_good ? of_causes : found;
+}
+
+Missing Alternatives::plain_for_searched(Missing found) const {
+  if (!has_judges(found) || found.answer == Answer::inner_state) return found;
+  std::set<std::vector<std::string>> places;
+  for (const FoundTerm& term : found.found) {
+    if (!term.generic && term.constants.size() > 0 && term.inputs.size() == 1) places.insert(term.inputs);
+  }
+  for (const std::vector<std::string>& place : places) {
+    Missing plain =
+        without(*refuted_, [&](const ModelTerm& term) { return term.inputs == place && !term.constants.empty(); });
+    const auto holds = [](const FoundTerm& term) { return term.confirmed && !term.generic; };
+    if (!plain.found.empty() && std::ranges::all_of(plain.found, holds) &&
+        left_on_held_out(plain, found) < clearly_less * left_on_held_out(found, found)) {
+      found = std::move(plain);
+    }
   }
   return found;
 }

@@ -37,10 +37,6 @@ class Alternatives {
   /// place do not seem to be worth their cost. Where terms without constants leave clearly less, they are the answer.
   Missing plain_for_searched(Missing found) const;
 
-  /// Changes of an inertia and of friction together change the output by almost a share of it. Where terms of the
-  /// inputs leave as little as a gain does, they become a rival of it.
-  Missing inputs_for_gain(Missing found) const;
-
  private:
   const Simulation* simulation_;
   const Inputs* inputs_;
@@ -53,5 +49,17 @@ class Alternatives {
   bool has_judges(const Missing& found) const { return inputs_->instants.size() > 0 && !found.held_out.empty(); }
   Missing without(std::set<std::size_t> refuted, const std::function<bool(const ModelTerm&)>& left_out) const;
 };
+
+/// Whether a share of the simulated output was found.
+bool has_gain(const Missing& missing);
+
+/// The indices of terms that are a share of the simulated output.
+std::set<std::size_t> shares_of_the_simulation(const std::vector<ModelTerm>& terms);
+
+/// Changes of an inertia and of friction together change the output by almost a share of it, and so do changes of all
+/// free parameters. `of_inputs` is the answer without shares. Where it explains as well on the rows set aside, by the
+/// margin of a rival: if it has fewer terms, it is the answer, and otherwise those that stand in the place of a gain
+/// become a rival of it.
+Missing inputs_for_gain(Missing found, Missing of_inputs, const MeasuredOutputs& measured, double rival_margin);
 
 }  // namespace llmt::discovery

@@ -207,12 +207,17 @@ namespace {
 
 // Covariance of estimates, in units of the variance of the samples: the sandwich inverse S inverse', S the sum of the
 // squares of the samples' `scores` (Carroll et al. 2006, appendix A.6). Errors of an input count where the model is
-// steep in it, so samples do not scatter alike.
-Eigen::MatrixXd sandwich(const Eigen::LDLT<Eigen::MatrixXd>& inverse, const Eigen::MatrixXd& scores,
-                         Eigen::Index outputs, double variance) {
-  const Eigen::Index samples = scores.rows() / outputs;
-  Eigen::MatrixXd of_samples = Eigen::MatrixXd::Zero(samples, scores.cols());
-  for (Eigen::Index i = 0; i < scores.rows(); ++i) of_samples.row(i / outputs) += scores.row(i);
+// steep in it, so samples do not scatter alike. The few that determine a coefficient pull it towards themselves; their
+// scores are divided by 1 - h, h the diagonal of the hat matrix (HC3 of MacKinnon and White 1985).
+Eigen::MatrixXd sandwich(const Eigen::LDLT<Eigen::MatrixXd>& inverse, const Eigen::MatrixXd& jacobian,
+                         const Eigen::MatrixXd& scores, Eigen::Index outputs, double variance) {
+  constexpr double most = 0.9;
+  const Eigen::MatrixXd solved = (jacobian.transpose() * jacobian).ldlt().solve(jacobian.transpose());
+  const Eigen::VectorXd leverage = jacobian.cwiseProduct(solved.transpose()).rowwise().sum();
+  Eigen::MatrixXd of_samples = Eigen::MatrixXd::Zero(scores.rows() / outputs, scores.cols());
+  for (Eigen::Index i = 0; i < scores.rows(); ++i) {
+    of_samples.row(i / outputs) += scores.row(i) / (1.0 - std::min(most, leverage(i)));
+  }
   of_samples.rowwise() -= of_samples.colwise().mean().eval();
   const Eigen::MatrixXd squares = of_samples.transpose() * of_samples / variance;
   return inverse.solve(inverse.solve(squares).transpose());
@@ -259,7 +264,7 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
     }
     const Eigen::VectorXd change = inverse.solve(scores.colwise().sum().transpose());
     const auto dof = static_cast<double>(std::max<Eigen::Index>(1, own.rows() - own.cols()));
-    const Eigen::MatrixXd spread = sandwich(inverse, scores, data.measured.cols(), residuals.squaredNorm() / dof);
+    const Eigen::MatrixXd spread = sandwich(inverse, own, scores, data.measured.cols(), residuals.squaredNorm() / dof);
     factors = (spread.diagonal().array() /
                gram.ldlt().solve(Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).diagonal().array())
                   .sqrt();

@@ -148,7 +148,6 @@ Missing find_at(const Simulation& simulation, const Inputs& inputs, const Measur
       missing = alternatives.state_for_terms(std::move(missing));
       missing = alternatives.causes_for_shapes(std::move(missing));
       missing = alternatives.plain_for_searched(std::move(missing));
-      missing = alternatives.inputs_for_gain(std::move(missing));
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
       return missing;
     }
@@ -233,16 +232,25 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   const Inputs inputs = with_zero_bands(there, smooth.inputs, measured);
   SearchedRows rows{rows_at_rest(inputs)};
   for (std::size_t i = 0; i < rows.apart.size(); ++i) rows.apart[i] = rows.apart[i] || smooth.unknown_sign[i];
-  std::set<std::size_t> refuted;
-  Beginning beginning = begin(there, inputs, measured, terms, rows, options, refuted);
-  // The filter of a recording looks like a state whose constants are not those of a machine.
-  for (auto beyond = beyond_constants(beginning.missing, terms); !beyond.empty();
-       beyond = beyond_constants(beginning.missing, terms)) {
-    refuted.insert(beyond.begin(), beyond.end());
-    beginning = begin(there, inputs, measured, terms, rows, options, refuted);
+  const auto search_without = [&](std::set<std::size_t> refuted) {
+    Beginning beginning = begin(there, inputs, measured, terms, rows, options, refuted);
+    // The filter of a recording looks like a state whose constants are not those of a machine.
+    for (auto beyond = beyond_constants(beginning.missing, terms); !beyond.empty();
+         beyond = beyond_constants(beginning.missing, terms)) {
+      refuted.insert(beyond.begin(), beyond.end());
+      beginning = begin(there, inputs, measured, terms, rows, options, refuted);
+    }
+    Missing found =
+        find_at(there, inputs, measured, terms, beginning.rows, options, refuted, std::move(beginning.missing));
+    found.notes.insert(found.notes.begin(), beginning.at_reversals.begin(), beginning.at_reversals.end());
+    return found;
+  };
+  Missing missing = search_without({});
+  const bool is_judged = inputs.instants.size() > 0 && !missing.held_out.empty();
+  if (is_judged && has_gain(missing) && missing.answer != Answer::inner_state) {
+    missing = inputs_for_gain(std::move(missing), search_without(shares_of_the_simulation(terms)), measured,
+                              options.search.rival_margin);
   }
-  Missing missing =
-      find_at(there, inputs, measured, terms, beginning.rows, options, refuted, std::move(beginning.missing));
   missing.zero_bands = inputs.zero_bands;
   if (is_smoothed) {
     missing.before -= smooth.change;
@@ -251,7 +259,6 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   }
   const std::vector<std::string> at_rest = notes_on_rest(inputs);
   missing.notes.insert(missing.notes.begin(), at_rest.begin(), at_rest.end());
-  missing.notes.insert(missing.notes.begin(), beginning.at_reversals.begin(), beginning.at_reversals.end());
   missing.notes.insert(missing.notes.begin(), smooth.notes.begin(), smooth.notes.end());
   return missing;
 }
