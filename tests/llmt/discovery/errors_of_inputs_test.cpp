@@ -74,5 +74,35 @@ TEST(ErrorsOfInputs, DoNotShrinkACoefficientWhereTheyAreTold) {
   EXPECT_LT(chi_squared, quantile);
 }
 
+// Errors of the input count at the few rows where the term is steep.
+TEST(ErrorsOfInputs, StandardErrorsAreTheSpreadOfEstimatesOfASteepTerm) {
+  constexpr int tables = 60;
+  constexpr double small_error = 0.01;
+  constexpr double width = 0.06;
+  const auto peak = [](double x) { return std::exp(-std::pow(x / width, 2.0)); };
+  Eigen::ArrayXd estimates(tables);
+  Eigen::ArrayXd errors(tables);
+  for (int k = 0; k < tables; ++k) {
+    Noise noise(static_cast<std::uint64_t>(k + 1));
+    Table table;
+    table.inputs.noise = Eigen::VectorXd::Constant(1, small_error);
+    for (Eigen::Index i = 0; i < 2000; ++i) {
+      const double x = noise.normal();
+      table.inputs.values(i, 0) = x + small_error * noise.normal();
+      table.simulated(i, 0) = table.inputs.values(i, 0);
+      table.measured.values(i, 0) = x + peak(x) + 0.05 * noise.normal();
+    }
+    const ModelTerm term = own_term("peak", "exp(-(x/w)^2)", [&](const Eigen::VectorXd& row) { return peak(row(0)); });
+    const Missing missing = find_missing(tabulated(table.simulated, {"y"}), table.inputs, table.measured, {term});
+    ASSERT_EQ(missing.found.size(), 1u);
+    estimates(k) = missing.found[0].coefficients(0);
+    errors(k) = missing.found[0].values[0].standard_error;
+  }
+  const double spread = (estimates - estimates.mean()).square().sum();
+  // 0.001 and 0.999 of chi square with 59 degrees of freedom.
+  EXPECT_GT(spread / errors.square().mean(), 30.6);
+  EXPECT_LT(spread / errors.square().mean(), 98.3);
+}
+
 }  // namespace
 }  // namespace errors_of_inputs_test

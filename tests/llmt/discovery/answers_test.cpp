@@ -1,0 +1,127 @@
+// What becomes of terms that were found: certain, tentative, or taken for others.
+#include <gtest/gtest.h>
+
+#include <string>
+#include <utility>
+
+#include "discovery/search/replacements.hpp"
+#include "discovery/terms/alternatives.hpp"
+#include "discovery/terms/missing_findings.hpp"
+#include "search_cases.hpp"
+
+namespace answers_test {
+namespace {
+
+using namespace llmt::discovery;
+
+FoundTerm found_term(std::size_t index, std::string family, std::string input, double value, double standard_error) {
+  FoundTerm found;
+  found.term = index;
+  found.family = std::move(family);
+  found.location = input;
+  if (!input.empty()) found.inputs = {input};
+  found.output = "y";
+  found.coefficients = Eigen::VectorXd::Constant(1, value);
+  found.values = {{"coefficient", "", value, standard_error}};
+  found.share = 0.5;
+  return found;
+}
+
+Missing answer_with(std::vector<FoundTerm> found) {
+  Missing missing;
+  missing.answer = Answer::named;
+  missing.verdict.answer = Answer::named;
+  missing.found = std::move(found);
+  return missing;
+}
+
+TEST(Answers, AnOffsetBesideAPowerIsTentativeWhereAFunctionOfTheInputCouldStandForIt) {
+  const auto power_and_offset = [](std::vector<RivalTerms> rivals) {
+    Missing missing = answer_with({found_term(0, "cube", "T", 1.0, 0.01), found_term(1, "offset", "", -3.0, 0.1)});
+    missing.found[1].rivals = std::move(rivals);
+    decide(missing, true);
+    return missing.found[0].confirmed && missing.found[1].confirmed;
+  };
+  EXPECT_TRUE(power_and_offset({}));
+  EXPECT_TRUE(power_and_offset({{"linear p", {"p"}, false}}));
+  EXPECT_FALSE(power_and_offset({{"root T", {"T"}, false}}));
+}
+
+TEST(Answers, ASearchedTermWhoseSizeIsNotKnownToAQuarterIsTentative) {
+  const auto is_confirmed = [](double standard_error, bool has_constant) {
+    FoundTerm peak = found_term(0, "stribeck", "v", 1.2, standard_error);
+    if (has_constant) {
+      peak.constants = Eigen::VectorXd::Constant(1, 0.1);
+      peak.values.push_back({"c", "v", 0.1, 0.01});
+    }
+    Missing missing = answer_with({peak});
+    decide(missing, true);
+    EXPECT_EQ(missing.notes.empty(), missing.found[0].confirmed);
+    return missing.found[0].confirmed;
+  };
+  EXPECT_TRUE(is_confirmed(0.15, true));
+  EXPECT_FALSE(is_confirmed(0.16, true));
+  EXPECT_TRUE(is_confirmed(0.16, false));
+}
+
+// Rows 0 to 99, of which half were set aside; each term leaves `error` everywhere.
+Missing leaving(double error, std::vector<FoundTerm> found) {
+  Missing missing = answer_with(std::move(found));
+  missing.corrected = Eigen::MatrixXd::Constant(100, 1, -error);
+  for (Eigen::Index row = 0; row < 50; ++row) missing.held_out.push_back(row);
+  missing.gaps = {{.output = "y", .before = 10.0, .after = error, .noise_floor = 1.0}};
+  return missing;
+}
+
+TEST(Answers, TermsOfInputsThatLeaveAsLittleAreRivalsOfAGain) {
+  const MeasuredOutputs measured{{"y"}, Eigen::MatrixXd::Zero(100, 1)};
+  const FoundTerm gain = found_term(0, "gain", "", 0.2, 0.01);
+  const FoundTerm drag = found_term(1, "signed_square", "v", 1.5, 0.01);
+  const FoundTerm inertia = found_term(2, "linear", "a", 0.5, 0.01);
+  const FoundTerm friction = found_term(3, "linear", "v", 0.4, 0.01);
+  const Missing found = leaving(1.0, {gain, drag});
+  // 50 rows: 1.21 of the squares are a logarithm of the likelihood of 5.25, 1.44 of them 11.
+  const Missing rival = inputs_for_gain(found, leaving(1.1, {inertia, friction, drag}), measured, 6.0);
+  ASSERT_EQ(rival.found.size(), 2u);
+  ASSERT_EQ(rival.found[0].rivals.size(), 1u);
+  EXPECT_EQ(rival.found[0].rivals[0].what, "linear a + linear v");
+  EXPECT_EQ(rival.answer, Answer::indistinguishable);
+  EXPECT_TRUE(inputs_for_gain(found, leaving(1.2, {inertia, friction, drag}), measured, 6.0).found[0].rivals.empty());
+
+  // With fewer terms they are the answer, unless it is uncertain.
+  EXPECT_EQ(inputs_for_gain(found, leaving(1.1, {inertia}), measured, 6.0).found[0].family, "linear");
+  EXPECT_EQ(inputs_for_gain(found, leaving(1.2, {inertia}), measured, 6.0).found[0].family, "gain");
+  Missing uncertain = leaving(1.1, {inertia});
+  uncertain.answer = Answer::unknown;
+  EXPECT_EQ(inputs_for_gain(found, uncertain, measured, 6.0).found[0].family, "gain");
+}
+
+TEST(Answers, OneHingeStandsForAHingeAtTheOtherSideWithALineAndAnOffset) {
+  llmt::Random random(3);
+  constexpr Eigen::Index n = 400;
+  search_cases::Case data;
+  data.evidence.components = 1;
+  data.evidence.jacobian = Eigen::MatrixXd(n, 0);
+  const Eigen::ArrayXd x = Eigen::ArrayXd::LinSpaced(n, -1.0, 1.0);
+  const auto add = [&](const std::string& family, int complexity, const Eigen::ArrayXd& signature) {
+    EffectCandidate candidate;
+    candidate.family = family;
+    candidate.location = family == "offset" ? "" : "x";
+    candidate.signature = signature.matrix();
+    candidate.complexity = complexity;
+    data.candidates.push_back(std::move(candidate));
+  };
+  add("offset", 1, Eigen::ArrayXd::Ones(n));
+  add("linear", 2, x);
+  add("hinge_below", 8, (0.25 - x).max(0.0));
+  add("hinge", 8, (x - 0.25).max(0.0));
+  data.evidence.residuals = 12.0 * data.candidates[3].signature + search_cases::normal_matrix(random, n, 1);
+  SearchOptions options;
+  options.simplest_of_rivals = true;
+  const Workspace workspace(data.evidence, data.candidates, options.absorbed_tolerance);
+  const Scoring scoring(workspace, data.candidates);
+  EXPECT_EQ(least_complex(scoring, {0, 1, 2}, options), Set{3});
+}
+
+}  // namespace
+}  // namespace answers_test
