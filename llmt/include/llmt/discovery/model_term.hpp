@@ -32,6 +32,9 @@ struct TermConstant {
   /// Powers 0 ... `beyond` of the first input of ModelTerm::inputs are projected out before values are compared, so
   /// that no value is preferred for a part that simpler terms explain.
   int beyond = 0;
+  /// It is the width of a step or a peak of the first input. What is narrower than the errors of that input cannot be
+  /// seen, see find_missing().
+  bool width = false;
 };
 
 /// One candidate: output += columns(rows, constants) * coefficients.

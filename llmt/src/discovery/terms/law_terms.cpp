@@ -109,6 +109,7 @@ ModelTerm coulomb_stribeck(const InputView& input) {
                     },
                     {"sign($1)", "sign($1)*exp(-(($1/$c)^2))"});
   term.prior_cost = cost_of_generality;
+  term.constants.front().width = true;
   return term;
 }
 

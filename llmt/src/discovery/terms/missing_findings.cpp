@@ -9,6 +9,7 @@
 #include <map>
 #include <set>
 
+#include "discovery/terms/input_noise.hpp"
 #include "discovery/terms/structure.hpp"
 
 namespace llmt::discovery {
@@ -265,6 +266,25 @@ std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector
     }
   }
   return beyond;
+}
+
+std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::vector<ModelTerm>& terms,
+                                           const Inputs& inputs) {
+  constexpr double visible = 2.0;  // standard deviations
+  std::set<std::size_t> narrow;
+  const auto has_width = [&](const FoundTerm& found) {
+    const std::vector<TermConstant>& constants = terms[found.term].constants;
+    return !constants.empty() && constants.front().width;
+  };
+  if (std::ranges::none_of(missing.found, has_width)) return narrow;
+  const Eigen::VectorXd variance =
+      covariance_of_errors(rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows())), inputs).diagonal();
+  for (const FoundTerm& found : missing.found) {
+    if (!has_width(found)) continue;
+    const auto column = std::ranges::find(inputs.names, found.inputs.front()) - inputs.names.begin();
+    if (std::abs(found.constants(0)) < visible * std::sqrt(variance(column))) narrow.insert(found.term);
+  }
+  return narrow;
 }
 
 bool is_worse(const Missing& missing) {

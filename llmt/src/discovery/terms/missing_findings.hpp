@@ -47,6 +47,11 @@ void demand_certainty(Missing& missing);
 /// the largest damping ratio tried or more: a filter, no machine, has such constants.
 std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms);
 
+/// The indices in `terms` of those that were found with a width below twice the standard deviation of the errors of
+/// their input: the errors smear what is so narrow, and it follows single rows.
+std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::vector<ModelTerm>& terms,
+                                           const Inputs& inputs);
+
 /// Of the errors of an output on the samples set aside: at the nominal parameters, with parameters alone, with terms.
 Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,
            const Eigen::VectorXd& after, double noise_floor);

@@ -124,10 +124,12 @@ ModelTerm settling(const InputView& input) {
 // Functions of inputs that change sign: those that saturate on both sides, and friction that falls as the speed grows.
 std::vector<ModelTerm> odd_functions(const InputView& input) {
   const std::string& x = input.name;
-  const TermConstant width = smooth_constant(input, "c", widths(input, 0.01));
+  TermConstant width = smooth_constant(input, "c", widths(input, 0.01));
+  width.width = true;
   // A narrower one is a sign and a line: Coulomb's and viscous friction.
   // Stribeck's peak has gone before the farther end. A wider one is a sign and a square.
-  const TermConstant peak = smooth_constant(input, "c", widths(input, 0.01, 0.3));
+  TermConstant peak = smooth_constant(input, "c", widths(input, 0.01, 0.3));
+  peak.width = true;
   const TermConstant wide = smooth_constant(input, "c", widths(input, 0.15));
   return {one_function(
               input, "tanh", fmt::format("tanh({}/c)", x), "limit", width,
