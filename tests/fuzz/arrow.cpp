@@ -15,6 +15,7 @@
 #include "llmt/arrow.hpp"
 #include "llmt/files.hpp"
 
+namespace fuzz_arrow {
 namespace {
 
 const std::vector<std::string> names = {"a", "b", ""};
@@ -93,7 +94,7 @@ void read_all(const llmt::ArrowTable& table) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(arrow) {
   std::string file = fuzz::text_of(data, size);
   fuzz::Bytes bytes(data, size);
   if (!file.starts_with("ARROW1")) file = changed(bytes);
@@ -106,3 +107,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_arrow

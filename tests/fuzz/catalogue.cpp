@@ -6,6 +6,7 @@
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/robot.hpp"
 
+namespace fuzz_catalogue {
 namespace {
 
 using namespace llmt::robotics;
@@ -40,7 +41,7 @@ Chain arm() {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(catalogue) {
   std::string text = fuzz::text_of(data, size);
   if (size > 0 && data[0] < ' ') {
     fuzz::Bytes bytes(data + 1, size - 1);
@@ -69,3 +70,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_catalogue

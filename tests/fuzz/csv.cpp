@@ -7,6 +7,7 @@
 #include "fuzz/fuzz.hpp"
 #include "llmt/csv.hpp"
 
+namespace fuzz_csv {
 namespace {
 
 struct Outcome {
@@ -63,7 +64,7 @@ Outcome in_pieces(const std::string& text, std::size_t bytes) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(csv) {
   const std::string text = fuzz::text_of(data, size);
   const Outcome expected = whole(text);
   for (const std::size_t bytes : {std::size_t{1}, 1 + size % 17, size + 1}) {
@@ -84,3 +85,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_csv

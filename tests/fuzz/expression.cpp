@@ -6,6 +6,7 @@
 
 #include "fuzz/fuzz.hpp"
 
+namespace fuzz_expression {
 namespace {
 
 constexpr double rounding = 1e-15;
@@ -186,7 +187,7 @@ void compare_with_reference(fuzz::Bytes& bytes) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(expression) {
   if (size > 0 && data[0] < ' ') {
     fuzz::Bytes bytes(data + 1, size - 1);
     compare_with_reference(bytes);
@@ -203,3 +204,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_expression

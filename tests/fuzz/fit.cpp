@@ -8,6 +8,7 @@
 #include "llmt/outliers.hpp"
 #include "oracles/oracles.hpp"
 
+namespace fuzz_fit {
 namespace {
 
 llmt::FitOptions options_of(fuzz::Bytes& bytes, const fuzz::Table& table, Eigen::VectorXd& weights) {
@@ -92,7 +93,7 @@ void not_worse_than_least_squares(fuzz::Bytes& bytes) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(fit) {
   fuzz::Bytes bytes(data, size);
   if (bytes.coin()) {
     any_fit(bytes);
@@ -101,3 +102,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_fit

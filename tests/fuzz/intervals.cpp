@@ -6,6 +6,7 @@
 #include "fuzz/json_mutator.hpp"
 #include "llmt/intervals.hpp"
 
+namespace fuzz_intervals {
 namespace {
 
 const std::vector<std::string> words = {"",          "x1",    "y", "model", "residuals", "residuals_incomplete",
@@ -13,7 +14,7 @@ const std::vector<std::string> words = {"",          "x1",    "y", "model", "res
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(intervals) {
   fuzz::Bytes bytes(data, size);
   fuzz::Json json = fuzz::Json::parse(bytes.one_of(fuzz::fitted_models()));
   // Folds of the model, or of another one, or of both.
@@ -45,3 +46,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_intervals

@@ -5,6 +5,7 @@
 
 #include "fuzz/fuzz.hpp"
 
+namespace fuzz_measurements {
 namespace {
 
 using namespace llmt::robotics;
@@ -24,7 +25,7 @@ Robot arm() {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(measurements) {
   static const Robot robot = arm();
   Measurements measurements;
   try {
@@ -44,3 +45,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                 "measurements survive writing");
   return 0;
 }
+
+}  // namespace fuzz_measurements

@@ -7,6 +7,7 @@
 #include "fuzz/json_mutator.hpp"
 #include "llmt/model.hpp"
 
+namespace fuzz_model {
 namespace {
 
 const std::vector<std::string> words = {"",     "crisp",        "blend",   "gaussian", "logistic",     "x1",
@@ -62,7 +63,7 @@ void evaluate(const llmt::Model& model) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(model) {
   std::string text = fuzz::text_of(data, size);
   if (!text.starts_with('{')) {
     fuzz::Bytes bytes(data, size);
@@ -80,3 +81,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_model

@@ -1,8 +1,8 @@
 // Runs a fuzz target without libFuzzer: first on the seeds, then on pseudo-random changes of them, the same ones in
 // every run.
 //
-//   fuzz_TARGET SEED_FOLDER COUNT [KEEP]    COUNT changes; each input is written to the file KEEP before it is run
-//   fuzz_TARGET FILE                        that input alone
+//   fuzz_replay TARGET SEED_FOLDER COUNT [KEEP]    COUNT changes; each input is written to the file KEEP before it is
+//   run fuzz_replay TARGET FILE                        that input alone
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
@@ -98,22 +98,29 @@ class Mutator {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc == 2) {
-    const Input input = read(argv[1]);
-    return LLVMFuzzerTestOneInput(input.data(), input.size());
+  const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  const auto target = words.empty() ? fuzz::targets().end() : fuzz::targets().find(words[0]);
+  if (target == fuzz::targets().end() || words.size() < 2) {
+    fmt::print(stderr, "fuzz_replay TARGET SEED_FOLDER COUNT [KEEP] or fuzz_replay TARGET FILE; targets:");
+    for (const auto& [name, run] : fuzz::targets()) fmt::print(stderr, " {}", name);
+    fmt::print(stderr, "\n");
+    return 2;
   }
-  if (argc < 3) return 2;
-  std::vector<Input> inputs = seeds_in(argv[1]);
+  if (words.size() == 2) {
+    const Input input = read(words[1]);
+    return target->second(input.data(), input.size());
+  }
+  std::vector<Input> inputs = seeds_in(words[1]);
   const std::size_t seeds = inputs.size();
   Mutator mutator(inputs);
-  const int count = std::atoi(argv[2]);
+  const int count = std::atoi(words[2].c_str());
   for (int k = 0; k < count; ++k) inputs.push_back(mutator.next());
   for (const Input& input : inputs) {
-    if (argc > 3) {
-      std::ofstream(argv[3], std::ios::binary)
+    if (words.size() > 3) {
+      std::ofstream(words[3], std::ios::binary)
           .write(reinterpret_cast<const char*>(input.data()), static_cast<std::streamsize>(input.size()));
     }
-    LLVMFuzzerTestOneInput(input.data(), input.size());
+    target->second(input.data(), input.size());
   }
   fmt::print("{} seeds, {} changes\n", seeds, count);
 }

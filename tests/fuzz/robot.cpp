@@ -7,6 +7,7 @@
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 
+namespace fuzz_robot {
 namespace {
 
 using namespace llmt::robotics;
@@ -62,7 +63,7 @@ void evaluate(const Robot& robot) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(robot) {
   std::string text = fuzz::text_of(data, size);
   if (size > 0 && data[0] < ' ') {
     fuzz::Bytes bytes(data + 1, size - 1);
@@ -83,3 +84,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_robot

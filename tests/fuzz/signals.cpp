@@ -5,7 +5,9 @@
 #include "fuzz/fuzz.hpp"
 #include "llmt/discovery/signals.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+namespace fuzz_signals {
+
+FUZZ_TARGET(signals) {
   using namespace llmt::discovery;
   const auto byte = [&](std::size_t k) { return size == 0 ? 0 : static_cast<int>(data[k % size]); };
   const Eigen::Index rows = 4 * static_cast<Eigen::Index>(std::min<std::size_t>(size, 500));
@@ -21,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     log.time(i) = t;
     log.positions(i, 0) = b * std::pow(2.0, byte(3) % 40 - 20);
     log.positions(i, 1) = b == 254 ? std::ldexp(1.0, byte(4) * 8 - 1000) : 1.0;
-    if (log.torques.cols() > 0) log.torques(i, 0) = b == 253 ? NAN : b;
+    if (log.torques.cols() > 0) log.torques(i, 0) = b == 253 ? std::numeric_limits<double>::quiet_NaN() : b;
     if (byte(5) % 3 == 0) log.runs.emplace_back(b == 252 ? "b" : std::to_string(i / 400));
   }
   SignalsOptions options{.cutoff = std::pow(10.0, byte(6) % 8 - 3)};
@@ -45,3 +47,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_signals

@@ -8,6 +8,7 @@
 #include "llmt/random.hpp"
 #include "oracles/oracles.hpp"
 
+namespace fuzz_split_search {
 namespace {
 
 llmt::FitResult split_once(const fuzz::Table& table, llmt::SplitSearch search, Eigen::Index min_leaf) {
@@ -98,7 +99,7 @@ void against_bins(fuzz::Bytes& bytes) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(split_search) {
   fuzz::Bytes bytes(data, size);
   if (bytes.byte() % 8 == 0) {
     against_bins(bytes);
@@ -107,3 +108,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_split_search

@@ -5,6 +5,7 @@
 
 #include "fuzz/table.hpp"
 
+namespace fuzz_stream {
 namespace {
 
 llmt::StreamOptions options_of(fuzz::Bytes& bytes) {
@@ -26,7 +27,7 @@ std::string written(const llmt::Stream& stream) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(stream) {
   fuzz::Bytes bytes(data, size);
   const llmt::StreamOptions options = options_of(bytes);
   const fuzz::Table table = fuzz::table_of(bytes, 200, 3, 1 + bytes.below(2), true);
@@ -48,3 +49,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::require(whole.counts().rows == passes * rows, "all rows are counted");
   return 0;
 }
+
+}  // namespace fuzz_stream

@@ -8,6 +8,7 @@
 #include "llmt/random.hpp"
 #include "llmt/stream.hpp"
 
+namespace fuzz_stream_state {
 namespace {
 
 const std::vector<std::string> words = {"",     "nan",    "inf",       "-inf", "llmt-stream",
@@ -59,7 +60,7 @@ void go_on(llmt::Stream& stream, Eigen::Index columns, Eigen::Index outputs) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(stream_state) {
   std::string text = fuzz::text_of(data, size);
   if (!text.starts_with('{')) {
     fuzz::Bytes bytes(data, size);
@@ -78,3 +79,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_stream_state

@@ -9,6 +9,7 @@
 #include "llmt/distributed.hpp"
 #include "llmt/random.hpp"
 
+namespace fuzz_sums {
 namespace {
 
 using namespace llmt::distributed;
@@ -92,7 +93,7 @@ void go_on(const State& state) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(sums) {
   fuzz::Bytes bytes(data, size);
   const int stage = bytes.below(static_cast<int>(stages().size()));
   const bool is_state = stage % 2 == 0;
@@ -116,3 +117,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_sums

@@ -6,6 +6,7 @@
 #include "fuzz/fuzz.hpp"
 #include "llmt/term_file.hpp"
 
+namespace fuzz_terms {
 namespace {
 
 struct Table {
@@ -24,7 +25,7 @@ Table table() {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(terms) {
   static const Table rows = table();
   try {
     std::set<std::string> names;
@@ -40,3 +41,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace fuzz_terms
