@@ -59,8 +59,7 @@ inline constexpr Eigen::Index importance_rows = 500;
 /// are 0 where the prediction does not change. Integrals are taken to 1e-4 of the output's range.
 ///
 /// It says what the model uses, not what causes the output; inputs that move together share as the model happens to
-/// weigh them. Same bytes at any number of threads (0: all). Reports to `progress` after each
-/// row.
+/// weigh them. Same bytes at any number of threads (0: all). Reports to `progress` after each row.
 ///
 /// Throws std::invalid_argument if the number of columns differs, a value is infinite or there is no row.
 Eigen::MatrixXd importance(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0,

@@ -44,7 +44,8 @@ double evidence_against(const Missing& other, const Missing& found, const Measur
       left_by_other += others * others;
       rows += 1.0;
     }
-    if (left > 0.0) evidence += 0.5 * found.time.independent_share * rows * (left_by_other / left - 1.0);
+    const double samples = found.time.independent_share * rows / static_cast<double>(found.time.rows_per_sample);
+    if (left > 0.0) evidence += 0.5 * samples * (left_by_other / left - 1.0);
   }
   return evidence;
 }

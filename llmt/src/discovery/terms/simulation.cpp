@@ -11,6 +11,7 @@
 #include "discovery/terms/determined.hpp"
 #include "discovery/terms/motion.hpp"
 #include "discovery/terms/one_search.hpp"
+#include "discovery/terms/progress_of_searches.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/reversals.hpp"
 #include "discovery/terms/row_split.hpp"
@@ -281,12 +282,9 @@ bool is_alike_in_neighbours(const MeasuredOutputs& measured, const Missing& miss
   return false;
 }
 
-}  // namespace
-
-Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                     const std::vector<ModelTerm>& terms, const MissingOptions& options) {
-  check(simulation, inputs, measured, options);
-  refuse_determined(simulation, inputs, measured);
+// Rows that nobody said to be a log are searched as one where what is left is alike in neighbours.
+Missing find_along_rows(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                        const std::vector<ModelTerm>& terms, const MissingOptions& options) {
   constexpr Eigen::Index fewest = 100;  // rows that are taken for a log although nobody said so
   const bool is_told = inputs.instants.size() > 0 || !inputs.order.empty() || inputs.values.rows() < fewest;
   const AlongRows rows = is_told ? AlongRows::independent : along_rows(inputs, options);
@@ -300,6 +298,20 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
       Eigen::VectorXd::LinSpaced(inputs.values.rows(), 0.0, static_cast<double>(inputs.values.rows() - 1));
   missing = find(simulation, in_time, measured, terms, options);
   missing.time.found_out = true;
+  return missing;
+}
+
+}  // namespace
+
+Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                     const std::vector<ModelTerm>& terms, const MissingOptions& options) {
+  check(simulation, inputs, measured, options);
+  refuse_determined(simulation, inputs, measured);
+  const ProgressOfSearches progress(options.progress);
+  MissingOptions watched = options;
+  watched.progress = progress.of_each();
+  Missing missing = find_along_rows(simulation, inputs, measured, terms, watched);
+  progress.finish();
   return missing;
 }
 
