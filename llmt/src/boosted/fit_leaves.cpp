@@ -95,27 +95,25 @@ void TreeGrower::fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::spa
       for (int i = j; i < size; ++i) zz[i][j] += w * z[i] * z[j];
     }
   }
-  {
-    for (int j = 0; j < size; ++j) mean[j] /= n;
-    for (int j = 0; j < size; ++j) {
-      ze[j] -= mean[j] * s;
-      for (int i = j; i < size; ++i) zz[i][j] -= n * mean[i] * mean[j];
-      zz[j][j] += options_.ridges.slope;
-    }
-    solve(zz, ze, size);
-    const double constant = s / (n + options_.ridges.constant);
-    leaf.model.constant += constant;
-    double middle = leaf.model.constant;
-    for (int j = 0; j < size; ++j) {
-      leaf.model.constant -= ze[j] * mean[j];
-      leaf.model.slopes[j] += ze[j];
-    }
-    for (int j = 0; j < size; ++j) middle += (leaf.model.slopes[j] - ze[j]) * mean[j];
-    if (low > high) low = high = middle;
-    const double margin = 0.1 * (high - low);
-    leaf.low = std::min(low - margin, middle);
-    leaf.high = std::max(high + margin, middle);
+  for (int j = 0; j < size; ++j) mean[j] /= n;
+  for (int j = 0; j < size; ++j) {
+    ze[j] -= mean[j] * s;
+    for (int i = j; i < size; ++i) zz[i][j] -= n * mean[i] * mean[j];
+    zz[j][j] += options_.ridges.slope;
   }
+  solve(zz, ze, size);
+  const double constant = s / (n + options_.ridges.constant);
+  leaf.model.constant += constant;
+  double middle = leaf.model.constant;
+  for (int j = 0; j < size; ++j) {
+    leaf.model.constant -= ze[j] * mean[j];
+    leaf.model.slopes[j] += ze[j];
+  }
+  for (int j = 0; j < size; ++j) middle += (leaf.model.slopes[j] - ze[j]) * mean[j];
+  if (low > high) low = high = middle;
+  const double margin = 0.1 * (high - low);
+  leaf.low = std::min(low - margin, middle);
+  leaf.high = std::max(high + margin, middle);
 }
 
 // A leaf without rows keeps its path's model within the range of the rows of the nearest node above.
