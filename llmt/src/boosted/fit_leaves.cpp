@@ -74,8 +74,8 @@ struct RegressorSums {
   SquareOfSlopes zz = {};  // of w z z'
 };
 
-// The number of slopes is known to the compiler, which unrolls the loops over them.
-template <int size, bool is_soft>
+// The compiler knows the number of slopes and unrolls the loops over them.
+template <int size, bool is_soft, bool is_weighted>
 RegressorSums regressor_sums(const PathModel& model, const BinnedRows& all, std::span<const int> rows,
                              std::span<const double> shares, const Eigen::VectorXd& residuals) {
   RegressorSums sums;
@@ -87,7 +87,8 @@ RegressorSums regressor_sums(const PathModel& model, const BinnedRows& all, std:
   }
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const Eigen::Index row = rows[k];
-    const double w = is_soft ? shares[k] * all.weights(row) : all.weights(row);
+    const double weight = is_weighted ? all.weights(row) : 1.0;
+    const double w = is_soft ? shares[k] * weight : weight;
     const double residual = residuals(row);
     if (!is_soft || shares[k] >= 0.5) {
       sums.low = std::min(sums.low, residual);
@@ -127,8 +128,13 @@ void TreeGrower::fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::spa
                           const Eigen::VectorXd& residuals) const {
   const int size = static_cast<int>(leaf.model.features.size());
   auto [n, s, low, high, mean, ze, zz] = with_size<most_boosted_slopes>(size, [&](auto fixed) {
-    return shares.empty() ? regressor_sums<fixed(), false>(leaf.model, rows_, rows, shares, residuals)
-                          : regressor_sums<fixed(), true>(leaf.model, rows_, rows, shares, residuals);
+    const auto sums = [&](auto is_soft, auto is_weighted) {
+      return regressor_sums<fixed(), is_soft(), is_weighted()>(leaf.model, rows_, rows, shares, residuals);
+    };
+    using std::false_type;
+    using std::true_type;
+    if (rows_.equal_weights) return shares.empty() ? sums(false_type(), false_type()) : sums(true_type(), false_type());
+    return shares.empty() ? sums(false_type(), true_type()) : sums(true_type(), true_type());
   });
   for (int j = 0; j < size; ++j) mean[j] /= n;
   for (int j = 0; j < size; ++j) {

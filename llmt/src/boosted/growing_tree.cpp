@@ -126,9 +126,10 @@ void TreeGrower::add_to_path(GrowingNode& side, int feature) {
   double z = 0.0;
   double zz = 0.0;
   double ze = 0.0;
+  std::vector<double>& waiting = spare_residuals_;  // has nothing now in the places of these rows
   for (Eigen::Index k = side.begin; k < side.end; ++k) {
     const double w = weights_[k];
-    const double value = values[order_[k]];
+    const double value = waiting[k] = values[order_[k]];
     n += w;
     s += w * residuals_[k];
     z += w * value;
@@ -149,7 +150,7 @@ void TreeGrower::add_to_path(GrowingNode& side, int feature) {
     }
   }
   for (Eigen::Index k = side.begin; k < side.end; ++k) {
-    residuals_[k] -= constant + slope * values[order_[k]];
+    residuals_[k] -= constant + slope * waiting[k];
     terms_[k] = packed(residuals_[k], weights_[k], units_);
   }
 }
