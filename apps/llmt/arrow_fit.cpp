@@ -83,6 +83,7 @@ Eigen::Index branch_rows_of(const ArrowFitArguments& arguments, std::size_t colu
 struct PassColumns {
   std::vector<std::string> names;
   Eigen::Index inputs = 0;
+  std::vector<std::vector<std::string>> levels;  // of the inputs
 
   bool has_weight() const { return std::ssize(names) == inputs + 2; }
 };
@@ -93,7 +94,7 @@ distributed::Sums sum_rows(const TableFiles& table, RowRange range, const PassCo
   distributed::Sums all;
   for (Eigen::Index first = range.first; first < range.last; first += blocks_at_once * block_rows) {
     const Eigen::Index count = std::min(blocks_at_once * block_rows, range.last - first);
-    const Eigen::MatrixXd rows = table.read(first, count, columns.names);
+    const Eigen::MatrixXd rows = table.read(first, count, columns.names, columns.levels);
     check_rows(table, columns.names, columns.inputs, rows, first);
     distributed::Rows shard{rows.leftCols(columns.inputs), rows.col(columns.inputs), first / block_rows};
     if (columns.has_weight()) shard.weights = rows.col(columns.inputs + 1);
@@ -186,18 +187,22 @@ void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& argumen
     throw std::invalid_argument(fmt::format("--target: one target is fitted at a time; the columns of {} are {}",
                                             table.name(), csv_row(table.columns())));
   }
-  PassColumns columns{choose_inputs(table.columns(), table.name(), learning)};
+  PassColumns columns;
+  columns.names = choose_inputs(table.columns(), table.name(), learning);
   columns.inputs = std::ssize(columns.names);
   columns.names.push_back(learning.targets.front());
   distributed::Options options{.weighted = !learning.weight.empty(), .fit = learning.options};
   if (options.weighted) columns.names.push_back(learning.weight);
-  table.require_numbers(columns.names);
+  const std::vector<std::string> inputs(columns.names.begin(), columns.names.begin() + columns.inputs);
+  table.require_numbers({columns.names.begin() + columns.inputs, columns.names.end()});
   options.fit.intervals = !arguments.no_intervals;
   options.branch_rows = branch_rows_of(arguments, columns.names.size());
   const bool is_first = processes.rank() == 0;
-  const std::vector<std::string> inputs(columns.names.begin(), columns.names.begin() + columns.inputs);
+  constexpr std::size_t most_words = 255;  // distributed::Options::levels
+  if (is_first) options.levels = table.levels(inputs, most_words);
   distributed::State state = distributed::State::from_bytes(
       processes.of_first(is_first ? first_state(arguments, inputs, options).to_bytes() : std::string()));
+  columns.levels = state.levels();
   const RowRange range = rows_of(processes, table.rows(), options.block_rows);
   const int threads = learning.options.max_threads;
   while (!state.finished()) {

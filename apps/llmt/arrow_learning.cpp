@@ -23,7 +23,8 @@ TrainingData read_into_memory(const TableFiles& table, const LearningArguments& 
   const Eigen::Index inputs = std::ssize(columns);
   columns.insert(columns.end(), arguments.targets.begin(), arguments.targets.end());
   if (!arguments.weight.empty()) columns.push_back(arguments.weight);
-  table.require_numbers(columns);
+  table.require_numbers({columns.begin() + inputs, columns.end()});
+  data.levels = table.levels(data.input_names, most_categories);
   constexpr double part_of_memory = 0.05;  // fits on several threads hold some ten times the table
   const double bytes = 8.0 * static_cast<double>(table.rows()) * static_cast<double>(columns.size());
   const double most = part_of_memory * static_cast<double>(physical_memory());
@@ -33,7 +34,7 @@ TrainingData read_into_memory(const TableFiles& table, const LearningArguments& 
         "-o part.arrow",
         table.name(), table.rows(), arguments.data, std::ceil(bytes / most)));
   }
-  const Eigen::MatrixXd rows = table.read(0, table.rows(), columns);
+  const Eigen::MatrixXd rows = table.read(0, table.rows(), columns, data.levels);
   check_rows(table, columns, inputs, rows, 0);
   data.inputs = rows.leftCols(inputs);
   data.outputs = rows.middleCols(inputs, std::ssize(arguments.targets));
@@ -78,8 +79,7 @@ LearningTable read_arrow_learning_table(const LearningArguments& arguments) {
   options.split_inputs = report::positions_of("--split-inputs", arguments.split_inputs, data.input_names);
   options.regression_inputs =
       report::positions_of("--regression-inputs", arguments.regression_inputs, data.input_names);
-  options.trends =
-      trends_of(arguments, data.input_names, std::vector<std::vector<std::string>>(data.input_names.size()));
+  options.trends = trends_of(arguments, data.input_names, data.levels);
   options.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
   learning.data = std::make_shared<const TrainingData>(std::move(data));
   return learning;

@@ -25,26 +25,21 @@ constexpr Eigen::Index rows_at_once = 65536;
 // The model's inputs, of which the table must have those that the model uses.
 class InputReader {
  public:
-  InputReader(const TableFiles& table, const Model& model, const std::string& path)
-      : table_(table), inputs_(std::ssize(model.inputs())) {
+  InputReader(const TableFiles& table, const Model& model) : table_(table), inputs_(std::ssize(model.inputs())) {
     const std::vector<bool> used = used_inputs(model);
     for (std::size_t j = 0; j < model.inputs().size(); ++j) {
       const InputColumn& input = model.inputs()[j];
       if (!used[j] && std::ranges::find(table.columns(), input.name) == table.columns().end()) continue;
-      if (input.is_categorical() && input.codes.empty()) {
-        throw std::runtime_error(fmt::format(
-            "{}: input \"{}\" has words for categories, and these files are read for numbers; give one CSV file", path,
-            input.name));
-      }
+      levels_.push_back(input.codes.empty() ? input.levels : std::vector<std::string>());
       names_.push_back(input.name);
       places_.push_back(static_cast<Eigen::Index>(j));
     }
-    table.require_numbers(names_);
+    table.check_kinds(names_, levels_);
   }
 
   Eigen::MatrixXd read(Eigen::Index first, Eigen::Index count) const {
     Eigen::MatrixXd inputs = Eigen::MatrixXd::Constant(count, inputs_, std::numeric_limits<double>::quiet_NaN());
-    inputs(Eigen::all, places_) = table_.read(first, count, names_);
+    inputs(Eigen::all, places_) = table_.read(first, count, names_, levels_);
     return inputs;
   }
 
@@ -52,6 +47,7 @@ class InputReader {
   const TableFiles& table_;
   Eigen::Index inputs_;
   std::vector<std::string> names_;
+  std::vector<std::vector<std::string>> levels_;
   std::vector<Eigen::Index> places_;
 };
 
@@ -77,7 +73,7 @@ void predict_files(const PredictArguments& arguments) {
   files.insert(files.end(), arguments.more.begin(), arguments.more.end());
   const TableFiles table(files, {arguments.mark, arguments.thousands});
   if (table.rows() == 0) throw std::runtime_error(fmt::format("{}: there are columns and no rows", table.name()));
-  const InputReader reader(table, model, arguments.model);
+  const InputReader reader(table, model);
   const std::string& target = model.outputs()[0].name;
   const bool has_target = std::ranges::find(table.columns(), target) != table.columns().end();
   if (has_target) table.require_numbers({target});

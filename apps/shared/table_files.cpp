@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "llmt/files.hpp"
+#include "llmt/training_data.hpp"
+#include "shared/cli.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -120,20 +123,92 @@ std::string TableFiles::name() const {
                    : fmt::format("{} and {} more file{}", files_.front().path, more, more == 1 ? "" : "s");
 }
 
-Eigen::MatrixXd TableFiles::read(Eigen::Index first, Eigen::Index count,
-                                 const std::vector<std::string>& columns) const {
+Eigen::MatrixXd TableFiles::read(Eigen::Index first, Eigen::Index count, const std::vector<std::string>& columns,
+                                 const std::vector<std::vector<std::string>>& levels) const {
+  std::vector<std::string> numbers;
+  std::vector<Eigen::Index> places;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    if (k < levels.size() && !levels[k].empty()) continue;
+    numbers.push_back(columns[k]);
+    places.push_back(static_cast<Eigen::Index>(k));
+  }
   Eigen::MatrixXd rows(count, std::ssize(columns));
   for (const File& file : files_) {
     const Eigen::Index begin = std::max(first, file.first);
     const Eigen::Index end = std::min(first + count, file.first + file.table.rows());
     if (begin >= end) continue;
-    rows.middleRows(begin - first, end - begin) = file.table.read(begin - file.first, end - begin, columns);
+    auto part = rows.middleRows(begin - first, end - begin);
+    part(Eigen::all, places) = file.table.read(begin - file.first, end - begin, numbers);
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+      if (levels[k].empty()) continue;
+      part.col(static_cast<Eigen::Index>(k)) =
+          category_values(file.table.texts(begin - file.first, end - begin, columns[k]), levels[k]);
+    }
   }
   return rows;
 }
 
+std::vector<std::string> TableFiles::words_of(const std::string& column, std::size_t most) const {
+  std::set<std::string> words;
+  for (const File& file : files_) {
+    for (Eigen::Index first = 0; first < file.table.rows(); first += rows_at_once) {
+      const Eigen::Index count = std::min(rows_at_once, file.table.rows() - first);
+      for (std::string& word : file.table.texts(first, count, column)) {
+        if (!word.empty()) words.insert(std::move(word));
+      }
+      if (words.size() <= most) continue;
+      throw std::runtime_error(fmt::format("{}: column \"{}\" has more than {} different words; --ignore leaves it out",
+                                           file.path, column, most));
+    }
+  }
+  for (const std::string& word : words) {
+    try {
+      Json(word).dump();
+    } catch (const Json::exception&) {
+      throw std::runtime_error(fmt::format("{}: column \"{}\" has words that are not UTF-8", name(), column));
+    }
+  }
+  return {words.begin(), words.end()};
+}
+
+std::vector<std::vector<std::string>> TableFiles::levels(const std::vector<std::string>& columns,
+                                                         std::size_t most) const {
+  std::vector<std::vector<std::string>> levels(columns.size());
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const bool is_text = files_.front().table.has_text(columns[k]);
+    for (const File& file : files_) {
+      if (file.table.has_text(columns[k]) == is_text) continue;
+      throw std::runtime_error(fmt::format("{}: column \"{}\" holds {}, and {} in {}", file.path, columns[k],
+                                           is_text ? "numbers" : "text", is_text ? "text" : "numbers",
+                                           files_.front().path));
+    }
+    if (!is_text) {
+      require_numbers({columns[k]});
+      continue;
+    }
+    levels[k] = words_of(columns[k], most);
+    if (levels[k].empty()) levels[k] = {"(none)"};  // as of a column of a CSV file
+  }
+  return levels;
+}
+
 void TableFiles::require_numbers(const std::vector<std::string>& columns) const {
   for (const File& file : files_) file.table.read(0, 0, columns);
+}
+
+void TableFiles::check_kinds(const std::vector<std::string>& columns,
+                             const std::vector<std::vector<std::string>>& levels) const {
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    if (levels[k].empty()) {
+      require_numbers({columns[k]});
+      continue;
+    }
+    for (const File& file : files_) {
+      if (file.table.has_text(columns[k])) continue;
+      throw std::runtime_error(
+          fmt::format("{}: column \"{}\" holds no text, and is a category of the model", file.path, columns[k]));
+    }
+  }
 }
 
 const TableFiles::File& TableFiles::file_of(Eigen::Index row) const {

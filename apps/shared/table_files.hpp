@@ -48,8 +48,8 @@ class RowsInOrder {
   Eigen::Index row_ = 0;
 };
 
-/// Files of numbers of which any rows are read, so that the table need not fit into memory. CSV files are written as
-/// Arrow files in the folder for temporary files first.
+/// Files of which any rows are read, so that the table need not fit into memory. CSV files, which must
+/// be of numbers, are written as Arrow files in the folder for temporary files first.
 class TableFiles {
  public:
   /// Throws std::runtime_error naming the file: one that cannot be read, has other columns than the first one (in
@@ -62,11 +62,21 @@ class TableFiles {
   const std::vector<std::string>& columns() const { return files_.front().table.columns(); }
   Eigen::Index rows() const { return rows_; }
 
-  /// As ArrowTable::read(). Errors name the file.
-  Eigen::MatrixXd read(Eigen::Index first, Eigen::Index count, const std::vector<std::string>& columns) const;
+  /// As ArrowTable::read(). `levels`: of each column the names of its categories, of which the places are read, NaN for
+  /// words that are not among them; none for numbers. Errors name the file.
+  Eigen::MatrixXd read(Eigen::Index first, Eigen::Index count, const std::vector<std::string>& columns,
+                       const std::vector<std::vector<std::string>>& levels = {}) const;
 
   /// Throws std::runtime_error for the first of these columns that does not exist, or holds no numbers in some file.
   void require_numbers(const std::vector<std::string>& columns) const;
+
+  /// Throws std::runtime_error naming file and column if a column with levels holds numbers, or one without holds none.
+  void check_kinds(const std::vector<std::string>& columns, const std::vector<std::vector<std::string>>& levels) const;
+
+  /// The different words of each column, sorted, without the empty one, which is a missing value; none for numbers.
+  /// Reads all rows of columns of text. Throws std::runtime_error naming file and column: one that has text in some
+  /// files and numbers in others, words that are not UTF-8, or more than `most` different ones.
+  std::vector<std::vector<std::string>> levels(const std::vector<std::string>& columns, std::size_t most) const;
 
   /// Throws std::runtime_error `FILE: row 17: column "c": reason`; `row` is that of the whole table, and rows count
   /// from 1 in their file.
@@ -80,6 +90,7 @@ class TableFiles {
   };
 
   const File& file_of(Eigen::Index row) const;
+  std::vector<std::string> words_of(const std::string& column, std::size_t most) const;
 
   std::vector<File> files_;
   Eigen::Index rows_ = 0;

@@ -77,9 +77,9 @@ std::size_t ArrowTable::Parts::first_buffer(const Column& column) const {
 void ArrowTable::Parts::read_numbers(const Batch& batch, const Column& column, Eigen::Index begin, Eigen::Index end,
                                      Eigen::Ref<Eigen::VectorXd> to) const {
   const std::size_t buffer = first_buffer(column);
-  const auto size = static_cast<std::int64_t>(bytes_of(column.numbers));
+  const auto each = static_cast<std::int64_t>(bytes_of(column.numbers));
   const std::int64_t values = batch.body + batch.buffers[buffer + 1][0];
-  convert(column.numbers, read(values + begin * size, (end - begin) * size), end - begin, to);
+  convert(column.numbers, read(values + begin * each, (end - begin) * each), end - begin, to);
   const std::vector<bool> valid = read_valid(batch, column, begin, end);
   for (Eigen::Index i = 0; i < end - begin; ++i) {
     if (!valid[static_cast<std::size_t>(i)]) to(i) = std::numeric_limits<double>::quiet_NaN();
@@ -104,8 +104,8 @@ std::vector<std::string> ArrowTable::Parts::read_texts(const Batch& batch, std::
                                                        const std::string& column) const {
   std::vector<std::string> texts(static_cast<std::size_t>(end - begin));
   if (texts.empty()) return texts;
-  const std::int64_t size = text == Text::small ? 4 : 8;
-  const std::string bytes = read(batch.body + batch.buffers[buffer + 1][0] + begin * size, (end - begin + 1) * size);
+  const std::int64_t each = text == Text::small ? 4 : 8;
+  const std::string bytes = read(batch.body + batch.buffers[buffer + 1][0] + begin * each, (end - begin + 1) * each);
   const std::vector<std::int64_t> offsets =
       text == Text::small ? offsets_of<std::int32_t>(bytes) : offsets_of<std::int64_t>(bytes);
   if (!std::ranges::is_sorted(offsets) || offsets.front() < 0 || offsets.back() > batch.buffers[buffer + 2][1]) {
