@@ -24,6 +24,13 @@ def open_parquet(path: str) -> Any:
         raise type(error)(f"{path}: {error}") from None
 
 
+def columns_of(path: str) -> list[str]:
+    """The columns of a file without those that pandas wrote for its index."""
+    schema = open_parquet(path).schema_arrow
+    index = (schema.pandas_metadata or {}).get("index_columns", [])
+    return [name for name in schema.names if name not in index]
+
+
 def count_rows(source: Any, name: str) -> int:
     return open_parquet(source).metadata.num_rows if isinstance(source, str) else len(source)
 

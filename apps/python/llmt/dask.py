@@ -21,7 +21,7 @@ import numpy as np
 from . import _core, distributed
 from ._estimator import LocalLinearTreeRegressor
 from ._files import write_bytes
-from ._shards import count_rows, open_parquet, sum_rows, words_of
+from ._shards import columns_of, count_rows, sum_rows, words_of
 
 __all__ = ["fit", "predict"]
 
@@ -143,7 +143,7 @@ def _partitions(table: Any) -> tuple[list[_Partition], list[str]]:
     """The partitions of a table, and its columns."""
     if isinstance(table, (str, os.PathLike)):
         files = _parquet_files(table)
-        return [_Partition(file, file) for file in files], open_parquet(files[0]).schema_arrow.names
+        return [_Partition(file, file) for file in files], columns_of(files[0])
     if not hasattr(table, "to_delayed"):
         raise TypeError(f"a table is a Dask DataFrame or the path of a folder, not {type(table).__name__}")
     frames = enumerate(table.to_delayed())

@@ -117,10 +117,12 @@ def sums(
     if len(X) == 0:
         return _core.distributed_sums(state, np.empty(np.shape(X)), np.empty(0), first_block, max_threads, weights)
     levels = _core.distributed_levels(state)
-    table = read_table(X, levels=levels)
+    table = read_table(X, levels=levels) if any(levels) else read_table(X)
     for position, unknown in enumerate(table.unknown):
+        name = position if table.names is None else table.names[position]
+        if table.levels[position] and not levels[position]:
+            raise ValueError(f'column "{name}" has words, and start was not given their levels')
         if unknown:
-            name = position if table.names is None else table.names[position]
             raise ValueError(f'column "{name}" has {unknown} cells with a word that is none of the levels of start')
     output, _ = read_targets(y)
     if output.ndim != 1:

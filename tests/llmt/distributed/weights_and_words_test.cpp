@@ -88,7 +88,7 @@ TEST(WeightsBeyondMemory, AWeightOfKIsKTimesTheRow) {
   for (double& weight : table.weights) weight = std::floor(random.uniform(0.0, 4.0));  // 0 to 3
   const auto repeat = [](const Weighed& shard) {
     std::vector<Eigen::Index> rows;
-    for (Eigen::Index i = 0; i < shard.output.size(); ++i) rows.insert(rows.end(), shard.weights(i), i);
+    for (Eigen::Index i = 0; i < shard.output.size(); ++i) rows.insert(rows.end(), static_cast<std::size_t>(shard.weights(i)), i);
     return Weighed{shard.inputs(rows, Eigen::all), shard.output(rows), {}};
   };
   const State weighed = run(table, with(700, true, false));
