@@ -127,6 +127,7 @@ void print_result(const ArrowFitArguments& arguments, const distributed::State& 
     json["passes"] = counts.passes;
     json["leaves"] = partition.num_leaves();
     json["top_leaves"] = counts.top_leaves;
+    json["is_of_sample"] = counts.is_of_sample;
     json["held_out_rmse"] = finite_or_null(counts.held_out_rmse);
     json["output"] = arguments.output;
     print_json(json);
@@ -137,7 +138,8 @@ void print_result(const ArrowFitArguments& arguments, const distributed::State& 
   };
   print(fmt::format("{}, {} passes over them\n", plural(counts.rows, "row", "rows"), counts.passes));
   print(fmt::format("{} in {}; {}\n", plural(partition.num_leaves(), "leaf", "leaves"),
-                    plural(counts.top_leaves, "branch", "branches, each fitted in memory"),
+                    counts.is_of_sample ? "a tree of a sample, fitted to all rows"
+                                        : plural(counts.top_leaves, "branch", "branches, each fitted in memory"),
                     std::isfinite(counts.held_out_rmse) ? fmt::format("held-out RMSE {:.5g}", counts.held_out_rmse)
                                                         : "no held-out rows"));
   print(arguments.output.empty() ? "Not written: give -o FILE.json\n"

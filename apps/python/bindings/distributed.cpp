@@ -82,6 +82,7 @@ nb::dict status(const nb::bytes& bytes) {
   result["branches"] = counts.branches;
   result["branches_done"] = counts.branches_done;
   result["rows_to_come"] = counts.rows_to_come;
+  result["is_of_sample"] = counts.is_of_sample;
   result["held_out_rmse"] = counts.held_out_rmse;
   return result;
 }

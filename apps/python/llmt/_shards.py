@@ -57,7 +57,7 @@ def _may_have_words(file: str, column: str) -> bool:
     if column not in schema.names:
         return True
     kind = schema.field(column).type
-    return types.is_string(kind) or types.is_large_string(kind) or types.is_dictionary(kind)
+    return bool(types.is_string(kind) or types.is_large_string(kind) or types.is_dictionary(kind))
 
 
 def _is_numeric(column: Any) -> bool:

@@ -153,9 +153,10 @@ def status(state: bytes) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``step``: what the next pass does, "describe", "grow" or "gather", or "finished"; ``passes`` so far; ``rows`` of
+        ``step``: what the next pass does, "describe", "grow", "gather" or "blend", or "finished"; ``passes`` so far; ``rows`` of
         the table, 0 before the first pass; ``top_leaves`` of the top of the tree; ``branches`` among them that are
-        fitted in memory, and ``branches_done``; ``rows_to_come``, which the next pass brings together; and
+        fitted in memory, and ``branches_done``; ``rows_to_come``, which the next pass brings together; ``is_of_sample``, whether the model is the tree of the
+        sample in place of top and branches; and
         ``held_out_rmse`` of the finished model.
     """
     result: dict[str, Any] = _core.distributed_status(state)

@@ -58,6 +58,7 @@ enum class Step {
   describe,  ///< the next pass finds means, ranges and a sample of the rows
   grow,      ///< the next pass sums bins of the nodes that are split next
   gather,    ///< the next pass brings the rows of some branches together
+  blend,     ///< the next pass fits the tree of the sample to all rows
   finished   ///< there is a model
 };
 
@@ -79,6 +80,7 @@ struct Counts {
   Eigen::Index branches_done = 0;  ///< and has finished
   Eigen::Index rows_to_come = 0;   ///< rows that the next pass brings together
   double held_out_rmse = 0.0;      ///< of the model: of branches and leaves, weighted by rows; NaN: nothing held out
+  bool is_of_sample = false;       ///< the model is the tree of the sample, in place of top and branches
 };
 
 struct StateData;

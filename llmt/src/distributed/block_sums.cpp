@@ -61,20 +61,6 @@ void check_weight(double weight, Eigen::Index row) {
   refuse(fmt::format("row {}: the weight is {}, it must be from 0 to {:g}", row, weight, largest_magnitude));
 }
 
-// The rows of one block.
-struct Block {
-  const Rows& rows;
-  RowSpan span;
-  Eigen::Index number;  // of the block in the table
-
-  double at(Eigen::Index row, Eigen::Index column) const {
-    if (column < rows.inputs.cols()) return rows.inputs(row, column);
-    return column == rows.inputs.cols() ? rows.output(row) : rows.weights(row);
-  }
-
-  double weight(Eigen::Index row) const { return rows.weights.size() == 0 ? 1.0 : rows.weights(row); }
-};
-
 Sample sample_of(const Block& block, Eigen::Index columns) {
   std::vector<std::pair<std::uint64_t, Eigen::Index>> hashed;
   const std::uint64_t of_block = row_hash(0, static_cast<double>(block.number));
@@ -250,11 +236,22 @@ void gather(const StateData& data, const Block& block, BlockSum& sum) {
   }
 }
 
+void check_block(const StateData& data, const Block& block) {
+  for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
+    for (Eigen::Index j = 0; j <= data.inputs(); ++j) check_value(data, block.at(row, j), row, j);
+    check_weight(block.weight(row), row);
+  }
+}
+
 BlockSum sum_block(const StateData& data, const Block& block) {
   BlockSum sum;
   if (data.step == Step::describe) describe(data, block, sum.description);
   if (data.step == Step::grow) grow(data, block, sum);
   if (data.step == Step::gather) gather(data, block, sum);
+  if (data.step == Step::blend) {
+    check_block(data, block);
+    add_joint(data, block, sum.joint);
+  }
   return sum;
 }
 
@@ -303,6 +300,7 @@ Sums sums(const Rows& rows, const State& state, int max_threads) {
   result->inputs = data.inputs();
   result->regressors = data.shape().coefficients() - 1;
   result->columns = data.row_columns();
+  result->unknowns = data.step == Step::blend ? unknowns_of(data) : 0;
   result->bins = data.step == Step::describe ? 0 : first_bins(data).back();
   const RowBlocks blocks{rows.output.size(), data.options.block_rows};
   if (blocks.count() == 0) return Sums(std::move(result));

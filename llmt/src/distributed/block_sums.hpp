@@ -10,10 +10,25 @@
 #include <vector>
 
 #include "base/sum_over.hpp"
+#include "distributed/sample_tree.hpp"
 #include "distributed/state.hpp"
 #include "llmt/distributed.hpp"
 
 namespace llmt::distributed {
+
+/// The rows of one block.
+struct Block {
+  const Rows& rows;
+  RowSpan span;
+  Eigen::Index number;  // of the block in the table
+
+  double at(Eigen::Index row, Eigen::Index column) const {
+    if (column < rows.inputs.cols()) return rows.inputs(row, column);
+    return column == rows.inputs.cols() ? rows.output(row) : rows.weights(row);
+  }
+
+  double weight(Eigen::Index row) const { return rows.weights.size() == 0 ? 1.0 : rows.weights(row); }
+};
 
 /// The rows with the smallest hashes of their block and place in it: a sample that is the same however sums are merged.
 struct Sample {
@@ -66,8 +81,11 @@ struct BlockSum {
   Extent root_residual;
   std::map<Eigen::Index, NodeSums> nodes;
   std::map<Eigen::Index, BranchRows> branches;
+  JointSums joint;
 
-  static auto fields(auto& self) { return std::tie(self.description, self.root_residual, self.nodes, self.branches); }
+  static auto fields(auto& self) {
+    return std::tie(self.description, self.root_residual, self.nodes, self.branches, self.joint);
+  }
 };
 
 /// Sums over blocks that follow each other.
@@ -86,10 +104,12 @@ struct SumsData {
   Eigen::Index regressors = 0;  ///< inputs that are numbers
   Eigen::Index columns = 0;     ///< StateData::row_columns()
   Eigen::Index bins = 0;        ///< of all inputs together
+  Eigen::Index unknowns = 0;    ///< of the sample's tree
   std::vector<Run> runs;        ///< ascending, with gaps between them
 
   static auto fields(auto& self) {
-    return std::tie(self.mark, self.step, self.inputs, self.regressors, self.columns, self.bins, self.runs);
+    return std::tie(self.mark, self.step, self.inputs, self.regressors, self.columns, self.bins, self.unknowns,
+                    self.runs);
   }
 };
 

@@ -160,13 +160,25 @@ State advance(const State& state, Sums sums, const Progress& progress, int max_t
   data.blocks = next;
   ++data.passes;
   // Before the root's model is known, its residuals have no range.
-  const bool has_root_model = data.step != Step::describe && data.nodes.front().fate == Fate::inner;
+  const bool has_root_model =
+      data.step != Step::describe && data.step != Step::blend && data.nodes.front().fate == Fate::inner;
   if (has_root_model) data.root_residual = total.root_residual;
-  if (data.step == Step::describe) take_description(data, std::move(total.description));
+  if (data.step == Step::describe) {
+    take_description(data, total.description);
+    if (data.rows > data.options.branch_rows) take_sample(data, total.description.sample, progress, max_threads);
+  }
   if (data.step == Step::grow) take_nodes(data, std::move(total.nodes));
   if (data.step == Step::gather) take_branches(data, std::move(total.branches), progress, max_threads);
+  if (data.step == Step::blend) {
+    take_joint(data, std::move(total.joint));
+    data.step = Step::finished;
+    return finish_state(std::move(data));
+  }
   ask(data);
-  if (data.step == Step::finished) finish(data);
+  if (data.step == Step::finished) {
+    finish(data);
+    if (!data.sample_model.empty()) data.step = Step::blend;
+  }
   return finish_state(std::move(data));
 }
 

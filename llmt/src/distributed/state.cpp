@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "distributed/sample_tree.hpp"
 #include "llmt/intervals.hpp"
 
 namespace llmt::distributed {
@@ -86,7 +87,20 @@ void check_nodes(const StateData& data) {
                 data.nodes[node].fate == expected,
             "a node that is asked for");
   }
-  require((data.step == Step::finished) == data.asked.empty(), "the list of nodes that are asked for");
+  require((data.step >= Step::blend) == data.asked.empty(), "the list of nodes that are asked for");
+  require(data.step != Step::blend || !data.sample_model.empty(), "the tree of the sample");
+}
+
+// The models of the pass that fits the tree of the sample.
+void check_sample(const StateData& data) {
+  const Model& sample = *data.sample;
+  const auto is_product = [](const Regressor& each) { return each.second_input >= 0; };
+  const auto is_of_inputs = [&](const Model& model) {
+    return data.inputs() == std::ssize(model.inputs()) && model.outputs().size() == 1 && model.partitions().size() == 1;
+  };
+  require(is_of_inputs(sample) && is_of_inputs(*data.result) && unknowns_of(data) <= most_unknowns &&
+              std::ranges::none_of(sample.regressors(), is_product),
+          "the tree of the sample");
 }
 
 void check_option(Eigen::Index value, Eigen::Index last) { require(value >= 0 && value <= last, "an option"); }
@@ -167,8 +181,12 @@ std::string_view unsealed(char kind, std::string_view bytes, const std::string& 
 
 State finish_state(StateData data) {
   data.mark = hash_of(llmt::to_bytes(data));
-  if (data.step == Step::finished && !data.result) {
+  if (data.step >= Step::blend && !data.result) {
     data.result = from_json_with_intervals(to_string(data.model), "the model of a state").model;
+  }
+  if (data.step == Step::blend && !data.sample) {
+    data.sample = from_json(to_string(data.sample_model), "the sample's model of a state");
+    check_sample(data);
   }
   return State(std::make_shared<const StateData>(std::move(data)));
 }
@@ -196,8 +214,11 @@ namespace llmt {
 template <>
 std::span<const Choice<distributed::Step>> choices() {
   using distributed::Step;
-  static constexpr Choice<Step> steps[] = {
-      {Step::describe, "describe"}, {Step::grow, "grow"}, {Step::gather, "gather"}, {Step::finished, "finished"}};
+  static constexpr Choice<Step> steps[] = {{Step::describe, "describe"},
+                                           {Step::grow, "grow"},
+                                           {Step::gather, "gather"},
+                                           {Step::blend, "blend"},
+                                           {Step::finished, "finished"}};
   return steps;
 }
 
@@ -220,6 +241,11 @@ Counts State::counts() const {
   if (data_->step == Step::gather) {
     for (const Eigen::Index node : data_->asked) counts.rows_to_come += data_->nodes[node].rows;
   }
+  if (data_->is_blended != 0) {
+    counts.is_of_sample = true;
+    counts.held_out_rmse = data_->sample_rmse;
+    return counts;
+  }
   counts.held_out_rmse = finished() ? std::sqrt(squares / data_->weight) : std::nan("");
   return counts;
 }
@@ -231,12 +257,12 @@ std::vector<std::vector<std::string>> State::levels() const {
 }
 
 const Model& State::model() const {
-  if (!data_->result) throw std::invalid_argument("llmt::distributed::State::model: the fit is not finished");
+  if (!finished()) throw std::invalid_argument("llmt::distributed::State::model: the fit is not finished");
   return *data_->result;
 }
 
 std::string State::model_json() const {
-  if (!data_->result) throw std::invalid_argument("llmt::distributed::State::model_json: the fit is not finished");
+  if (!finished()) throw std::invalid_argument("llmt::distributed::State::model_json: the fit is not finished");
   return to_string(data_->model);
 }
 

@@ -19,6 +19,9 @@ namespace llmt::distributed {
 /// Categories of an input: as many as bins of a number may be.
 inline constexpr std::size_t most_levels = 255;
 
+/// The joint equations of the sample's tree have at most so many unknowns: 8 MB.
+inline constexpr Eigen::Index most_unknowns = 1000;
+
 /// Text that base/sums.hpp writes.
 using Text = std::vector<char>;
 
@@ -112,11 +115,15 @@ struct StateData {
   std::vector<TopNode> nodes;                     ///< children behind their parents, in pairs
   std::vector<Eigen::Index> asked;                ///< nodes of the next pass, ascending
   Extent root_residual;                           ///< of the root's model, in units of the output
-  Text model;                                     ///< finished: JSON, with intervals if there are any
+  Text model;                   ///< of top and branches, or finished: JSON, with intervals if there are any
+  Text sample_model;            ///< the tree of the sample, as fit() made it: JSON; empty: there is none
+  double sample_rmse = 0.0;     ///< its held-out error in the sample, later on held-out blocks; NaN: none
+  Eigen::Index is_blended = 0;  ///< finished: the model is the tree of the sample
 
   // Not part of the bytes.
   std::uint64_t mark = 0;       ///< a hash of the bytes: which state sums belong to
   std::optional<Model> result;  ///< of `model`
+  std::optional<Model> sample;  ///< of `sample_model`, for the pass that fits it
 
   Eigen::Index inputs() const { return std::ssize(input_names); }
   bool is_category(Eigen::Index column) const { return column < inputs() && !levels[column].empty(); }
@@ -129,7 +136,8 @@ struct StateData {
   static auto fields(auto& self) {
     return std::tie(self.options, self.input_names, self.output_name, self.levels, self.step, self.passes, self.blocks,
                     self.rows, self.weight, self.weight_scale, self.range, self.mean, self.scale, self.edges,
-                    self.level_weight, self.nodes, self.asked, self.root_residual, self.model);
+                    self.level_weight, self.nodes, self.asked, self.root_residual, self.model, self.sample_model,
+                    self.sample_rmse, self.is_blended);
   }
 };
 

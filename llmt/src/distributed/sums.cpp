@@ -28,6 +28,13 @@ void check_block_sum(const SumsData& data, const BlockSum& sum) {
                   "the description of the columns");
   require_of_sums(sum.nodes.empty() || data.step == Step::grow, "a node");
   require_of_sums(sum.branches.empty() || data.step == Step::gather, "a branch");
+  const JointSums& joint = sum.joint;
+  const bool joins = data.step == Step::blend;
+  const Eigen::Index side = joins ? data.unknowns + 1 : 0;
+  require_of_sums(joint.gram.rows() == side && joint.gram.cols() == side && joint.held_out.rows() == side &&
+                      joint.held_out.cols() == side && std::ssize(joint.leaf_rows) == std::ssize(joint.leaf_squares) &&
+                      std::ssize(joint.leaf_rows) <= data.unknowns,
+                  "the equations of a tree");
   const Eigen::Index size = GramShape(data.regressors + 1, 1).size();
   for (const auto& [at, node] : sum.nodes) {
     require_of_sums(has(node.grams, data.bins * size) && has(node.counts, data.bins) && has(node.held_out, size) &&
@@ -49,7 +56,7 @@ void check_sums(const SumsData& data) {
   require_of_sums(data.step >= Step::describe && data.step < Step::finished && data.inputs >= 0 &&
                       data.inputs < most_inputs && data.regressors >= 0 && data.regressors <= data.inputs &&
                       data.columns > data.inputs && data.columns <= data.inputs + 2 && data.bins >= 0 &&
-                      data.bins <= 256 * data.inputs,
+                      data.bins <= 256 * data.inputs && data.unknowns >= 0 && data.unknowns <= most_unknowns,
                   "the number of inputs or bins");
   Eigen::Index behind = -1;
   for (const Run& run : data.runs) {
@@ -91,7 +98,8 @@ Sums merge(Sums a, Sums b) {
   if (a.data() == nullptr || a.data()->runs.empty()) return b;
   const SumsData& other = *b.data();
   if (a.data()->mark != other.mark || a.data()->inputs != other.inputs || a.data()->regressors != other.regressors ||
-      a.data()->columns != other.columns || a.data()->bins != other.bins || a.data()->step != other.step) {
+      a.data()->columns != other.columns || a.data()->bins != other.bins || a.data()->unknowns != other.unknowns ||
+      a.data()->step != other.step) {
     throw std::invalid_argument("llmt::distributed::merge: the sums belong to different states");
   }
   std::vector<Run> all = std::move(a.data()->runs);
