@@ -1,23 +1,23 @@
 #include "llmt/arrow_fit.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
 
-#include "llmt/arrow.hpp"
+#include "llmt/arrow_learning.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/distributed.hpp"
 #include "llmt/files.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
+#include "shared/table_files.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -31,19 +31,18 @@ constexpr double bytes_per_byte = 5.0;
 // The part of the memory that branches may take; the rest is for sums and the tree.
 constexpr double part_for_branches = 0.75;
 
-constexpr std::string_view name_of_step[] = {"describe", "grow", "gather", "finished"};
-
 void refuse_options_of_csv(const CLI::App& command) {
-  constexpr std::array<std::string_view, 22> taken = {
-      "data",     "target", "inputs",       "ignore",     "cv",        "max-leaves", "min-leaf", "threads",
-      "validity", "width",  "jump",         "ridge",      "shrinkage", "estimation", "sparse",   "significance",
-      "seed",     "prune",  "no-intervals", "checkpoint", "resume",    "rule"};
-  constexpr std::array<std::string_view, 6> more = {"memory", "output", "json", "loss", "local-models", "patience"};
+  constexpr std::string_view taken[] = {
+      "data",         "more",         "target",        "inputs",   "ignore",   "weight",       "cv",
+      "max-leaves",   "min-leaf",     "threads",       "rule",     "validity", "width",        "jump",
+      "ridge",        "shrinkage",    "estimation",    "sparse",   "seed",     "significance", "prune",
+      "loss",         "json",         "output",        "memory",   "resume",   "patience",     "checkpoint",
+      "local-models", "no-intervals", "decimal-comma", "thousands"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_single_name();
-    if (option->count() > 0 && std::ranges::find(taken, name) == taken.end() &&
-        std::ranges::find(more, name) == more.end()) {
-      throw std::invalid_argument(fmt::format("--{} is not for Arrow files; give the table as CSV", name));
+    if (option->count() > 0 && std::ranges::find(taken, name) == std::end(taken)) {
+      throw std::invalid_argument(
+          fmt::format("--{} is not for Arrow files or several files; give the table as one CSV file", name));
     }
   }
 }
@@ -63,34 +62,43 @@ RowRange rows_of(const Processes& processes, Eigen::Index rows, Eigen::Index blo
 
 double memory_of(const ArrowFitArguments& arguments) {
   if (!arguments.memory.empty()) return read_memory(arguments.memory);
-  return 0.5 * static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
+  return 0.5 * physical_memory();
 }
 
-// Names the row, counted from 1, and the column of what cannot be learned from.
-void check_arrow_rows(const ArrowTable& table, const std::vector<std::string>& columns, const Eigen::MatrixXd& rows,
-                      Eigen::Index first) {
-  for (Eigen::Index j = 0; j < rows.cols(); ++j) {
-    const bool is_target = j + 1 == rows.cols();
-    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-      const double value = rows(i, j);
-      if (std::abs(value) <= largest_magnitude || (std::isnan(value) && !is_target)) continue;
-      throw std::runtime_error(fmt::format("{}: row {}: column \"{}\" is {}", table.path(), first + i + 1, columns[j],
-                                           std::isnan(value) ? "missing" : fmt::format("{}", value)));
-    }
+// The most rows that a branch may have.
+Eigen::Index branch_rows_of(const ArrowFitArguments& arguments, std::size_t columns) {
+  constexpr double fewest = 100.0;
+  constexpr double most = 1e12;
+  const double row_bytes = 8.0 * static_cast<double>(columns);
+  const double rows = part_for_branches * memory_of(arguments) / (bytes_per_byte * row_bytes);
+  if (rows < fewest) {
+    throw std::invalid_argument(
+        fmt::format("--memory is \"{}\", {} columns need at least {:.0f}K", arguments.memory, columns,
+                    std::ceil(fewest * bytes_per_byte * row_bytes / part_for_branches / 1024.0)));
   }
+  return static_cast<Eigen::Index>(std::min(rows, most));
 }
 
-// One pass over the rows first ... last - 1, which begin with a block. `columns`: inputs, target.
-distributed::Sums sum_rows(const ArrowTable& table, RowRange range, const std::vector<std::string>& columns,
+// The columns that a pass reads: inputs, target, and the weight if there is one.
+struct PassColumns {
+  std::vector<std::string> names;
+  Eigen::Index inputs = 0;
+  std::vector<std::vector<std::string>> levels;  // of the inputs
+
+  bool has_weight() const { return std::ssize(names) == inputs + 2; }
+};
+
+// One pass over the rows first ... last - 1, which begin with a block.
+distributed::Sums sum_rows(const TableFiles& table, RowRange range, const PassColumns& columns,
                            const distributed::State& state, Eigen::Index block_rows, int threads, ProgressBar& bar) {
   distributed::Sums all;
-  const Eigen::Index inputs = std::ssize(columns) - 1;
   for (Eigen::Index first = range.first; first < range.last; first += blocks_at_once * block_rows) {
     const Eigen::Index count = std::min(blocks_at_once * block_rows, range.last - first);
-    const Eigen::MatrixXd rows = table.read(first, count, columns);
-    check_arrow_rows(table, columns, rows, first);
-    all = merge(std::move(all),
-                distributed::sums({rows.leftCols(inputs), rows.col(inputs), first / block_rows}, state, threads));
+    const Eigen::MatrixXd rows = table.read(first, count, columns.names, columns.levels);
+    check_rows(table, columns.names, columns.inputs, rows, first);
+    distributed::Rows shard{rows.leftCols(columns.inputs), rows.col(columns.inputs), first / block_rows};
+    if (columns.has_weight()) shard.weights = rows.col(columns.inputs + 1);
+    all = merge(std::move(all), distributed::sums(shard, state, threads));
     bar.show(first + count - range.first, range.last - range.first);
   }
   return all;
@@ -119,19 +127,32 @@ void print_result(const ArrowFitArguments& arguments, const distributed::State& 
     json["passes"] = counts.passes;
     json["leaves"] = partition.num_leaves();
     json["top_leaves"] = counts.top_leaves;
+    json["is_of_sample"] = counts.is_of_sample;
     json["held_out_rmse"] = finite_or_null(counts.held_out_rmse);
     json["output"] = arguments.output;
     print_json(json);
     return;
   }
-  print(fmt::format("{} rows, {} passes over them\n", counts.rows, counts.passes));
-  print(fmt::format("{} leaves in {} {}; held-out RMSE {:.5g}\n", partition.num_leaves(), counts.top_leaves,
-                    counts.top_leaves == 1 ? "branch" : "branches, each fitted in memory", counts.held_out_rmse));
+  const auto plural = [](Eigen::Index count, const char* one, const char* many) {
+    return fmt::format("{} {}", count, count == 1 ? one : many);
+  };
+  print(fmt::format("{}, {} passes over them\n", plural(counts.rows, "row", "rows"), counts.passes));
+  print(fmt::format("{} in {}; {}\n", plural(partition.num_leaves(), "leaf", "leaves"),
+                    counts.is_of_sample ? "a tree of a sample, fitted to all rows"
+                                        : plural(counts.top_leaves, "branch", "branches, each fitted in memory"),
+                    std::isfinite(counts.held_out_rmse) ? fmt::format("held-out RMSE {:.5g}", counts.held_out_rmse)
+                                                        : "no held-out rows"));
   print(arguments.output.empty() ? "Not written: give -o FILE.json\n"
                                  : fmt::format("Model written to {}\n", arguments.output));
 }
 
 }  // namespace
+
+std::vector<std::string> ArrowFitArguments::files() const {
+  std::vector<std::string> all = {learning.data};
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
 
 double read_memory(const std::string& text) {
   double value = 0.0;
@@ -139,19 +160,20 @@ double read_memory(const std::string& text) {
   const std::string unit(end, text.data() + text.size());
   constexpr std::string_view units = "KMGT";
   const std::size_t at = unit.size() == 1 ? units.find(unit.front()) : std::string_view::npos;
-  if (error != std::errc() || at == std::string_view::npos || !(value > 0.0)) {
+  if (error != std::errc() || at == std::string_view::npos || !(value > 0.0) || !std::isfinite(value)) {
     throw std::invalid_argument(fmt::format("--memory is \"{}\", it must be a number with K, M, G or T: 4G", text));
   }
   return value * std::pow(1024.0, static_cast<double>(at) + 1.0);
 }
 
 void add_arrow_fit_options(CLI::App& command, ArrowFitArguments& arguments) {
+  add_input_files(command, "more", arguments.more, "Further files of the same table, Arrow or CSV");
   command
       .add_option("--memory", arguments.memory,
-                  "Of an Arrow file: memory that the fit may take, such as 4G [half of the machine's]")
+                  "Of Arrow or several files: memory that the fit may take, such as 4G [half of the machine's]")
       ->type_name("BYTES");
   add_output_file(command, "--checkpoint", arguments.checkpoint,
-                  "Of an Arrow file: where the fit stands after every pass over the rows");
+                  "Of Arrow or several files: where the fit stands after every pass over the rows");
   command.add_flag("--resume", arguments.resume, "Go on from the file of --checkpoint if there is one");
 }
 
@@ -161,31 +183,32 @@ void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& argumen
     throw std::invalid_argument("--resume goes on from the file of --checkpoint, which is not given");
   }
   const LearningArguments& learning = arguments.learning;
-  const ArrowTable table = ArrowTable::open(learning.data);
-  if (table.rows() == 0) throw std::runtime_error(fmt::format("{}: there are columns and no rows", table.path()));
-  std::string header;
-  for (const std::string& column : table.columns()) header += (header.empty() ? "" : ",") + csv_field(column);
+  const TableFiles table(arguments.files(), {learning.mark, learning.thousands});
+  if (table.rows() == 0) throw std::runtime_error(fmt::format("{}: there are columns and no rows", table.name()));
   if (learning.targets.size() != 1) {
-    throw std::invalid_argument(
-        fmt::format("--target: an Arrow file is fitted for one target at a time; the columns of "
-                    "{} are {}",
-                    table.path(), csv_row(table.columns())));
+    throw std::invalid_argument(fmt::format("--target: one target is fitted at a time; the columns of {} are {}",
+                                            table.name(), csv_row(table.columns())));
   }
-  std::vector<std::string> columns = choose_inputs(Csv::parse(header + "\n", table.path()), learning);
-  distributed::Options options{.fit = learning.options};
+  PassColumns columns;
+  columns.names = choose_inputs(table.columns(), table.name(), learning);
+  columns.inputs = std::ssize(columns.names);
+  columns.names.push_back(learning.targets.front());
+  distributed::Options options{.weighted = !learning.weight.empty(), .fit = learning.options};
+  if (options.weighted) columns.names.push_back(learning.weight);
+  const std::vector<std::string> inputs(columns.names.begin(), columns.names.begin() + columns.inputs);
+  table.require_numbers({columns.names.begin() + columns.inputs, columns.names.end()});
   options.fit.intervals = !arguments.no_intervals;
-  const double row_bytes = 8.0 * static_cast<double>(columns.size() + 1);
-  options.branch_rows = std::max<Eigen::Index>(
-      100, static_cast<Eigen::Index>(part_for_branches * memory_of(arguments) / (bytes_per_byte * row_bytes)));
+  options.branch_rows = branch_rows_of(arguments, columns.names.size());
   const bool is_first = processes.rank() == 0;
+  constexpr std::size_t most_words = 255;  // distributed::Options::levels
+  if (is_first) options.levels = table.levels(inputs, most_words);
   distributed::State state = distributed::State::from_bytes(
-      processes.of_first(is_first ? first_state(arguments, columns, options).to_bytes() : std::string()));
-  columns.push_back(learning.targets.front());
+      processes.of_first(is_first ? first_state(arguments, inputs, options).to_bytes() : std::string()));
+  columns.levels = state.levels();
   const RowRange range = rows_of(processes, table.rows(), options.block_rows);
   const int threads = learning.options.max_threads;
   while (!state.finished()) {
-    ProgressBar bar(
-        fmt::format("pass {} ({})", state.counts().passes + 1, name_of_step[static_cast<std::size_t>(state.step())]));
+    ProgressBar bar(fmt::format("pass {} ({})", state.counts().passes + 1, name_of(state.step())));
     distributed::Sums all = processes.merged(sum_rows(table, range, columns, state, options.block_rows, threads, bar));
     std::string next;
     if (is_first) {

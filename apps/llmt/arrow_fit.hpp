@@ -1,10 +1,11 @@
 /// \file
-/// `llmt fit` of a table in an Arrow file, which need not fit into memory.
+/// `llmt fit` of a table in Arrow files, or in several files, which need not fit into memory.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "llmt/distributed.hpp"
 #include "llmt/learning.hpp"
@@ -16,15 +17,18 @@ struct ArrowFitArguments {
   std::string output;
   bool json = false;
   bool no_intervals = false;
-  std::string memory;      ///< "4G"; empty: half of the machine's
-  std::string checkpoint;  ///< file of the state after every pass; empty: none
-  bool resume = false;     ///< begin with the checkpoint
+  std::vector<std::string> more;  ///< files behind learning.data
+  std::string memory;             ///< "4G"; empty: half of the machine's
+  std::string checkpoint;         ///< file of the state after every pass; empty: none
+  bool resume = false;            ///< begin with the checkpoint
+
+  std::vector<std::string> files() const;
 };
 
 /// Bytes from a number with K, M, G or T: "4G", "500M". Throws std::invalid_argument naming the option.
 double read_memory(const std::string& text);
 
-/// Adds --memory, --checkpoint and --resume.
+/// Adds further files, --memory, --checkpoint and --resume.
 void add_arrow_fit_options(CLI::App& command, ArrowFitArguments& arguments);
 
 /// The processes that share every pass over a table. Here it is one.

@@ -174,7 +174,7 @@ void add_fit(CLI::App& app) {
                     "as a rule, and nobody reads it");
   add_arrow_fit_options(*command, arguments->arrow);
   command->callback([command, arguments] {
-    if (is_arrow_file(arguments->learning.data)) {
+    if (is_arrow_file(arguments->learning.data) || !arguments->arrow.more.empty()) {
       ArrowFitArguments arrow = arguments->arrow;
       arrow.learning = arguments->learning;
       arrow.output = arguments->output;
@@ -186,7 +186,8 @@ void add_fit(CLI::App& app) {
     }
     for (const char* option : {"--memory", "--checkpoint", "--resume"}) {
       if (command->count(option) > 0) {
-        throw std::invalid_argument(fmt::format("{} is for Arrow files; llmt table makes one", option));
+        throw std::invalid_argument(
+            fmt::format("{} is for Arrow files, and for several; llmt table makes one", option));
       }
     }
     require_target(arguments->learning);

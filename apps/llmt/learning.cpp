@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "llmt/arrow.hpp"
+#include "llmt/arrow_learning.hpp"
 #include "llmt/csv.hpp"
 #include "report/table/named_inputs.hpp"
 #include "shared/cli.hpp"
@@ -145,9 +147,15 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
   return inputs;
 }
 
-namespace {
+std::vector<std::string> choose_inputs(const std::vector<std::string>& columns, const std::string& name,
+                                       const LearningArguments& arguments) {
+  std::string header;
+  for (const std::string& column : columns) header += (header.empty() ? "" : ",") + csv_field(column);
+  const Csv csv = Csv::parse(header + "\n", name);
+  if (!arguments.weight.empty()) csv.index_of(arguments.weight);
+  return choose_inputs(csv, arguments);
+}
 
-// What --monotone and --slope-sign ask for, one entry an input; none if they ask for nothing.
 std::vector<Trend> trends_of(const LearningArguments& arguments, const std::vector<std::string>& inputs,
                              const std::vector<std::vector<std::string>>& levels) {
   const std::vector<int> monotone = report::signs_of("--monotone", arguments.monotone, inputs);
@@ -171,6 +179,8 @@ std::vector<Trend> trends_of(const LearningArguments& arguments, const std::vect
   return trends;
 }
 
+namespace {
+
 std::vector<Eigen::Index> lines_of_rows(const Csv& csv) {
   std::vector<Eigen::Index> rows(csv.rows());
   std::iota(rows.begin(), rows.end(), Eigen::Index{0});
@@ -180,6 +190,7 @@ std::vector<Eigen::Index> lines_of_rows(const Csv& csv) {
 }  // namespace
 
 LearningTable read_learning_table(const LearningArguments& arguments) {
+  if (is_arrow_file(arguments.data)) return read_arrow_learning_table(arguments);
   const Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", csv.name()));

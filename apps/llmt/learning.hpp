@@ -40,6 +40,15 @@ void require_target(const LearningArguments& arguments);
 /// read_learning_table().
 std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments);
 
+/// The same for a table of which only the columns and the name are known.
+std::vector<std::string> choose_inputs(const std::vector<std::string>& columns, const std::string& name,
+                                       const LearningArguments& arguments);
+
+/// What --monotone and --slope-sign ask for, one entry an input; none if they ask for nothing. `levels`: of the inputs,
+/// none for numbers.
+std::vector<Trend> trends_of(const LearningArguments& arguments, const std::vector<std::string>& inputs,
+                             const std::vector<std::vector<std::string>>& levels);
+
 /// The table as the learner takes it, and the options with its columns filled in.
 struct LearningTable {
   std::shared_ptr<const TrainingData> data;

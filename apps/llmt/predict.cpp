@@ -1,13 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 
 #include "llmt/arrow.hpp"
+#include "llmt/arrow_predict.hpp"
 #include "llmt/boosted_model.hpp"
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
@@ -23,25 +23,6 @@
 
 namespace llmt::apps {
 namespace {
-
-struct PredictArguments {
-  std::string model;
-  std::string data;
-  std::string output;
-  bool json = false;
-  double interval = 0.0;  // level; 0: none
-  DecimalMark mark = DecimalMark::point;
-  bool thousands = false;
-  int threads = 0;
-};
-
-// Shortest text that reads back as the same number.
-void append_number(std::string& text, DecimalMark mark, double value) {
-  char buffer[32];
-  const std::to_chars_result end = std::to_chars(std::begin(buffer), std::end(buffer), value);
-  std::replace(std::begin(buffer), end.ptr, '.', static_cast<char>(mark));
-  text.append(buffer, end.ptr);
-}
 
 // What trees and sums of trees say of the rows alike.
 template <class AnyModel>
@@ -166,64 +147,6 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
   sink(text);
 }
 
-// Predictions of an Arrow file, whose rows are read piece by piece; the table's own columns are not repeated.
-void predict_arrow(const PredictArguments& arguments) {
-  if (arguments.json || arguments.interval > 0.0) {
-    throw std::invalid_argument(fmt::format("{} is not for Arrow files", arguments.json ? "--json" : "--interval"));
-  }
-  const Model model = load_model(arguments.model, false).model;
-  const ArrowTable table = ArrowTable::open(arguments.data);
-  std::vector<std::string> names;
-  for (const InputColumn& input : model.inputs()) {
-    if (input.is_categorical()) {
-      throw std::runtime_error(fmt::format("{}: input \"{}\" is a category, and an Arrow file is read for numbers",
-                                           arguments.model, input.name));
-    }
-    names.push_back(input.name);
-  }
-  const bool has_target = std::ranges::find(table.columns(), model.outputs()[0].name) != table.columns().end();
-  double squares = 0.0;
-  const auto write = [&](const TextSink& sink) {
-    std::string text;
-    for (const OutputColumn& output : model.outputs()) text += csv_field(output.name + "_pred") + ",";
-    sink(text + "outside,outside_by,leverage\n");
-    constexpr Eigen::Index rows_at_once = 65536;
-    for (Eigen::Index first = 0; first < table.rows(); first += rows_at_once) {
-      const Eigen::Index count = std::min(rows_at_once, table.rows() - first);
-      const Eigen::MatrixXd inputs = table.read(first, count, names);
-      const Eigen::MatrixXd values = model.predict(inputs, arguments.threads);
-      const std::vector<Extrapolation> extrapolation = model.extrapolation(inputs, arguments.threads);
-      if (has_target) {
-        const Eigen::MatrixXd target = table.read(first, count, {&model.outputs()[0].name, 1});
-        squares += (values.col(0) - target).squaredNorm();
-      }
-      text.clear();
-      for (Eigen::Index row = 0; row < count; ++row) {
-        for (Eigen::Index o = 0; o < values.cols(); ++o) {
-          append_number(text, arguments.mark, values(row, o));
-          text += ',';
-        }
-        text += extrapolation[row].distance > 0.0 ? "1," : "0,";
-        append_number(text, arguments.mark, extrapolation[row].distance);
-        text += ',';
-        append_number(text, arguments.mark, extrapolation[row].leverage);
-        text += '\n';
-      }
-      sink(text);
-    }
-  };
-  if (arguments.output.empty()) {
-    write(print_bytes);
-  } else {
-    write_file(arguments.output, write);
-  }
-  warn(fmt::format("llmt: {} rows of {}", table.rows(), table.path()));
-  if (has_target && std::isfinite(squares)) {
-    warn(fmt::format("llmt: RMSE of \"{}\": {:.6g}", model.outputs()[0].name,
-                     std::sqrt(squares / static_cast<double>(table.rows()))));
-  }
-}
-
 report::Prediction predict_file(const PredictArguments& arguments, std::optional<Csv>& csv) {
   const auto read = [&] {
     csv.emplace(read_table(arguments.data, arguments.mark, arguments.thousands));
@@ -242,8 +165,8 @@ report::Prediction predict_file(const PredictArguments& arguments, std::optional
 }
 
 void predict_command(const PredictArguments& arguments) {
-  if (is_arrow_file(arguments.data)) {
-    predict_arrow(arguments);
+  if (is_arrow_file(arguments.data) || !arguments.more.empty()) {
+    predict_files(arguments);
     return;
   }
   std::optional<Csv> csv;
@@ -279,8 +202,10 @@ void add_predict(CLI::App& app) {
   const auto arguments = std::make_shared<PredictArguments>();
   add_input_file(*command, "model", arguments->model, "Model file of llmt fit")->required();
   add_input_file(*command, "data", arguments->data,
-                 "CSV file with the model's inputs; other columns are passed through; - is standard input")
+                 "CSV or Arrow file with the model's inputs; other columns of one CSV file are passed through; - is "
+                 "standard input")
       ->required();
+  add_input_files(*command, "more", arguments->more, "Further files of the same table, Arrow or CSV");
   add_output_file(*command, "-o,--output", arguments->output, "CSV file to write [standard output]");
   constexpr NumberRange level = {0.01, 0.9999, "a number from 0.01 to 0.9999"};
   add_number(*command, "--interval", arguments->interval, level,

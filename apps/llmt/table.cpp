@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -8,9 +7,9 @@
 
 #include "llmt/arrow.hpp"
 #include "llmt/commands.hpp"
-#include "llmt/csv.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
+#include "shared/table_files.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -18,62 +17,37 @@ namespace {
 struct TableArguments {
   std::vector<std::string> data;
   std::string output;
-  DecimalMark mark = DecimalMark::point;
-  bool thousands = false;
+  Eigen::Index every = 1;
+  NumberFormat format;
 };
 
-// The rows of several CSV files, one file behind the other.
-class CsvRows {
+// Every so many rows of all that are given, the first one among them.
+class SomeRows {
  public:
-  explicit CsvRows(const TableArguments& arguments) : arguments_(arguments) { open(); }
+  explicit SomeRows(Eigen::Index every) : every_(every) {}
 
-  const std::vector<std::string>& columns() const { return columns_; }
-
-  std::optional<Eigen::MatrixXd> next() {
-    while (true) {
-      if (std::optional<Csv> piece = take()) {
-        if (arguments_.thousands) piece->read_thousands();
-        return piece->numbers_or_missing(columns_, 1);
-      }
-      if (at_ + 1 == arguments_.data.size()) return std::nullopt;
-      ++at_;
-      open();
-    }
+  Eigen::MatrixXd of(const Eigen::MatrixXd& rows) {
+    std::vector<Eigen::Index> kept;
+    for (Eigen::Index row = skip_; row < rows.rows(); row += every_) kept.push_back(row);
+    skip_ += std::ssize(kept) * every_ - rows.rows();
+    return rows(kept, Eigen::all);
   }
 
  private:
-  void open() {
-    const std::string& path = arguments_.data[at_];
-    file_ = std::make_unique<std::ifstream>(path, std::ios::binary);
-    if (!*file_) throw std::runtime_error(fmt::format("{}: cannot be read", path));
-    pieces_ = std::make_unique<CsvPieces>(*file_, path, std::size_t{1} << 22, arguments_.mark);
-    first_ = pieces_->next();
-    if (!first_) return;
-    if (columns_.empty()) columns_ = first_->columns();
-    if (first_->columns() != columns_) {
-      throw std::runtime_error(fmt::format("{}: the columns are {}, those of {} are {}", path,
-                                           csv_row(first_->columns()), arguments_.data.front(), csv_row(columns_)));
-    }
-  }
-
-  std::optional<Csv> take() {
-    if (!first_) return pieces_->next();
-    return std::exchange(first_, std::nullopt);
-  }
-
-  const TableArguments& arguments_;
-  std::size_t at_ = 0;
-  std::vector<std::string> columns_;
-  std::unique_ptr<std::ifstream> file_;
-  std::unique_ptr<CsvPieces> pieces_;
-  std::optional<Csv> first_;  // read for its columns
+  Eigen::Index every_;
+  Eigen::Index skip_ = 0;  // rows before the next one
 };
 
 void table_command(const TableArguments& arguments) {
   if (arguments.output.empty()) throw std::invalid_argument("-o FILE.arrow is required");
-  CsvRows rows(arguments);
+  RowsInOrder rows(arguments.data, arguments.format);
+  SomeRows some(arguments.every);
   if (rows.columns().empty()) throw std::runtime_error(fmt::format("{}: there are no rows", arguments.data.front()));
-  const Eigen::Index count = write_arrow(arguments.output, rows.columns(), [&] { return rows.next(); });
+  const Eigen::Index count = write_arrow(arguments.output, rows.columns(), [&]() -> std::optional<Eigen::MatrixXd> {
+    const std::optional<Eigen::MatrixXd> given = rows.next();
+    if (!given) return std::nullopt;
+    return some.of(*given);
+  });
   print(fmt::format("{} rows, {} columns written to {}\n", count, rows.columns().size(), arguments.output));
 }
 
@@ -88,10 +62,13 @@ void add_table(CLI::App& app) {
       "one table.");
   command->footer("Example: llmt table january.csv february.csv -o year.arrow");
   const auto arguments = std::make_shared<TableArguments>();
-  command->add_option("data", arguments->data, "CSV files with a header row")->required()->type_name("FILE ...");
+  add_input_files(*command, "data", arguments->data, "CSV files with a header row, or Arrow files")->required();
   add_output_file(*command, "-o,--output", arguments->output, "Arrow file to write (required)");
-  add_decimal_comma(*command, arguments->mark);
-  add_thousands(*command, arguments->thousands);
+  add_count(*command, "--every", arguments->every, Eigen::Index{1}, "Write every so many rows alone",
+            Eigen::Index{1'000'000'000})
+      ->capture_default_str();
+  add_decimal_comma(*command, arguments->format.mark);
+  add_thousands(*command, arguments->format.thousands);
   command->callback([arguments] { table_command(*arguments); });
 }
 

@@ -35,8 +35,8 @@ int run_program(int argc, char** argv) {
       app, "--patience", patience, above_zero,
       "Seconds that a process waits for another before the job ends; the first one also fits branches meanwhile");
   app.callback([&] {
-    if (!llmt::is_arrow_file(arguments.learning.data)) {
-      throw std::invalid_argument(arguments.learning.data + ": is no Arrow file; llmt table makes one");
+    for (const std::string& file : arguments.files()) {
+      if (!llmt::is_arrow_file(file)) throw std::invalid_argument(file + ": is no Arrow file; llmt table makes one");
     }
     MpiProcesses processes{std::chrono::duration<double>(patience)};
     arrow_fit_command(app, arguments, processes);

@@ -203,6 +203,11 @@ CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::str
   return command.add_option(name, path, help)->type_name(input_type);
 }
 
+CLI::Option* add_input_files(CLI::App& command, const std::string& name, std::vector<std::string>& paths,
+                             const std::string& help) {
+  return command.add_option(name, paths, help)->type_name(input_type)->option_text("FILE ...");
+}
+
 CLI::Option* add_output_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help,
                              const std::vector<std::string>& extensions) {
   // The texts of all options are there before the first of them is taken.

@@ -87,6 +87,10 @@ CLI::Option* add_thousands(CLI::App& command, bool& thousands);
 /// A file that the command reads, shown as FILE. A dash is standard input where the command says so.
 CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help);
 
+/// One file or more; the last of the positional arguments.
+CLI::Option* add_input_files(CLI::App& command, const std::string& name, std::vector<std::string>& paths,
+                             const std::string& help);
+
 /// The file that the command writes, shown as NEWFILE. It is checked before the command runs. Throws
 /// std::invalid_argument if it is one of the input files or another output, by whatever name or link, and
 /// std::runtime_error if it is a folder or lies in none. Devices and pipes may be named twice. `extensions`: of further

@@ -27,6 +27,13 @@ std::string kinked_with_colours(int rows) {
   return text;
 }
 
+// Writes d.csv and m.json, the sum fitted to it.
+void fit_sum(const Folder& folder, int rows) {
+  folder.write("d.csv", kinked_with_colours(rows));
+  const Outcome fitted = folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json");
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+}
+
 TEST(BoostProgram, FitsAndPredictsAsTheLibrary) {
   const Folder folder;
   folder.write("d.csv", kinked_with_colours(300));
@@ -52,9 +59,8 @@ TEST(BoostProgram, FitsAndPredictsAsTheLibrary) {
 
 TEST(BoostProgram, RefusesByNameWhatIsForOneTree) {
   const Folder folder;
-  folder.write("d.csv", kinked_with_colours(60));
+  ASSERT_NO_FATAL_FAILURE(fit_sum(folder, 60));
   folder.write("one.csv", "a,y\n1,2\n");
-  ASSERT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json").exit_code, 0);
   const auto refused = [&](const std::string& command, const std::string& words) {
     const Outcome outcome = folder.run(LLMT_PROGRAM " " + command);
     EXPECT_NE(outcome.exit_code, 0) << command;
@@ -71,8 +77,7 @@ TEST(BoostProgram, RefusesByNameWhatIsForOneTree) {
 
 TEST(BoostProgram, PredictsIntervals) {
   const Folder folder;
-  folder.write("d.csv", kinked_with_colours(300));
-  ASSERT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json").exit_code, 0);
+  ASSERT_NO_FATAL_FAILURE(fit_sum(folder, 300));
   const Outcome predicted = folder.run(LLMT_PROGRAM " predict m.json d.csv --interval 0.9");
   ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
   const llmt::Csv answer = llmt::Csv::parse(predicted.out, "answer");
@@ -83,8 +88,7 @@ TEST(BoostProgram, PredictsIntervals) {
 
 TEST(BoostProgram, InspectsASum) {
   const Folder folder;
-  folder.write("d.csv", kinked_with_colours(100));
-  ASSERT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json").exit_code, 0);
+  ASSERT_NO_FATAL_FAILURE(fit_sum(folder, 100));
   const llmt::BoostedModel model = llmt::load_boosted(folder.file("m.json"));
   const llmt::BoostedSize size = size_of(model);
   const Outcome shown = folder.run(LLMT_PROGRAM " inspect m.json");
@@ -99,8 +103,7 @@ TEST(BoostProgram, InspectsASum) {
 
 TEST(BoostProgram, ExplainsRowsAndTables) {
   const Folder folder;
-  folder.write("d.csv", kinked_with_colours(150));
-  ASSERT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json").exit_code, 0);
+  ASSERT_NO_FATAL_FAILURE(fit_sum(folder, 150));
   const Outcome of_row = folder.run(LLMT_PROGRAM " explain m.json d.csv --row 2 --json");
   ASSERT_EQ(of_row.exit_code, 0) << of_row.err;
   const json target = json::parse(of_row.out)["targets"][0];
@@ -143,8 +146,7 @@ TEST(BoostProgram, IsComparedWithOneTree) {
 
 TEST(BoostProgram, ExportsC) {
   const Folder folder;
-  folder.write("d.csv", kinked_with_colours(60));
-  ASSERT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost -o m.json").exit_code, 0);
+  ASSERT_NO_FATAL_FAILURE(fit_sum(folder, 60));
   const Outcome exported = folder.run(LLMT_PROGRAM " export --c m.json -o m.c --name sum");
   ASSERT_EQ(exported.exit_code, 0) << exported.err;
   EXPECT_NE(llmt::read_file(folder.file("m.c")).find("int sum_predict(const double *inputs, double *outputs)"),

@@ -14,6 +14,7 @@
 #include "fuzz/fuzz.hpp"
 #include "llmt/arrow.hpp"
 #include "llmt/files.hpp"
+#include "oracles/arrow_files.hpp"
 
 namespace fuzz_arrow {
 namespace {
@@ -51,7 +52,7 @@ const std::string& written() {
 
 // Bytes are set, numbers of four and eight bytes too, and the end is cut off.
 std::string changed(fuzz::Bytes& bytes) {
-  std::string file = written();
+  std::string file = bytes.coin() ? written() : arrow_files::words();
   while (!bytes.empty() && !file.empty()) {
     const auto at = static_cast<std::size_t>(bytes.below(65536)) % file.size();
     switch (bytes.below(8)) {
@@ -75,12 +76,23 @@ bool same(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a.size() == b.size() && (a.size() == 0 || std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0);
 }
 
+void read_text(const llmt::ArrowTable& table, Eigen::Index rows, const std::string& column) {
+  const std::vector<std::string> whole = table.texts(0, rows, column);
+  fuzz::require(std::ssize(whole) == rows, "there are as many texts as were asked for");
+  const std::vector<std::string> later = table.texts(rows / 2, rows - rows / 2, column);
+  fuzz::require(std::equal(later.begin(), later.end(), whole.begin() + rows / 2), "a piece is a piece of the whole");
+}
+
 void read_all(const llmt::ArrowTable& table) {
   constexpr Eigen::Index most_rows = 1000;  // a column without values may claim any number
   const Eigen::Index rows = std::min(table.rows(), most_rows);
   for (const std::string& column : table.columns()) {
     const std::vector<std::string> one = {column};
     try {
+      if (table.has_text(column)) {
+        read_text(table, rows, column);
+        continue;
+      }
       const Eigen::MatrixXd whole = table.read(0, rows, one);
       fuzz::require(whole.rows() == rows && whole.cols() == 1, "there are as many rows as were asked for");
       const Eigen::MatrixXd later = table.read(rows / 2, rows - rows / 2, one);

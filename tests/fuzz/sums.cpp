@@ -19,30 +19,36 @@ constexpr Eigen::Index block_rows = 40;
 struct Table {
   Eigen::MatrixXd inputs;
   Eigen::VectorXd output;
+  Eigen::VectorXd weights;
 };
 
 const Table& table() {
   static const Table rows = [] {
     llmt::Random random(1);
-    Table made{Eigen::MatrixXd(360, 2), Eigen::VectorXd(360)};
+    Table made{Eigen::MatrixXd(360, 3), Eigen::VectorXd(360), Eigen::VectorXd(360)};
     for (double& value : made.inputs.reshaped()) value = random.uniform(-1.0, 1.0);
-    made.output = made.inputs.col(0).cwiseAbs() + 0.1 * made.inputs.col(1);
+    for (Eigen::Index i = 0; i < 360; ++i) {
+      made.inputs(i, 2) = static_cast<double>(i % 3);
+      made.weights(i) = static_cast<double>(i % 4);
+    }
+    made.output = made.inputs.col(0).cwiseAbs() + 0.1 * made.inputs.col(1) + made.inputs.col(2);
     return made;
   }();
   return rows;
 }
 
-Sums sums_of_all(const State& state) { return sums({table().inputs, table().output, 0}, state, 1); }
+Sums sums_of_all(const State& state) { return sums({table().inputs, table().output, 0, table().weights}, state, 1); }
 
 // The bytes of all states of a fit, and of the sums that they ask for.
 const std::vector<std::string>& stages() {
   static const std::vector<std::string> all = [] {
-    Options options{.branch_rows = 130, .block_rows = block_rows};
+    Options options{
+        .branch_rows = 130, .block_rows = block_rows, .weighted = true, .levels = {{}, {}, {"r", "s", "t"}}};
     options.fit.max_leaves = 2;
     options.fit.folds.count = 0;
     options.fit.validity = llmt::ValidityChoice::crisp;
     std::vector<std::string> bytes;
-    State state = start({"a", "b"}, "y", options);
+    State state = start({"a", "b", "c"}, "y", options);
     while (!state.finished()) {
       Sums next = sums_of_all(state);
       bytes.push_back(state.to_bytes());

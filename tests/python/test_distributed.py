@@ -71,7 +71,7 @@ def test_what_does_not_go_is_named():
         distributed.advance(state, distributed.sums(state, X[:99], y[:99], 2))
     with pytest.raises(ValueError, match="row 1 of y"):
         distributed.sums(state, X[:3], np.array([1.0, np.nan, 2.0]))
-    with pytest.raises(ValueError, match="has words"):
+    with pytest.raises(ValueError, match="has words, and start was not given"):
         distributed.sums(state, np.array([["a", "b", "c"]], dtype=object), y[:1])
     with pytest.raises(ValueError, match="there is one target"):
         distributed.sums(state, X, np.column_stack([y, y]))
@@ -183,5 +183,105 @@ def test_dask_goes_on_from_a_checkpoint_and_names_what_is_wrong(frames, tmp_path
     broken = frame.assign(y=frame.y.where(frame.a < 0.99))
     with pytest.raises(ValueError, match=r'partition \d, rows from 0: row \d+, column "y" is nan'):
         llmt_dask.fit(broken, "y", **OPTIONS)
-    with pytest.raises(ValueError, match=r'partition \d: column "w" has words'):
-        llmt_dask.fit(frame.assign(w="low"), "y", **OPTIONS)
+    with pytest.raises(ValueError, match='no column "w"'):
+        llmt_dask.fit(frame, "y", weight="w", **OPTIONS)
+
+
+def mixed(rows=1500):
+    """A table with words, weights 0 to 3, and a column for the words' places."""
+    pandas = pytest.importorskip("pandas")
+    rng = np.random.default_rng(3)
+    words = np.array(["high", "low", "mid"])
+    place = rng.integers(0, 3, rows)
+    a = rng.uniform(-1, 1, rows)
+    y = np.array([3.0, -3.0, 0.0])[place] + np.abs(a) * 2 + NOISE * rng.normal(size=rows)
+    return pandas.DataFrame({"a": a, "w": words[place], "k": rng.integers(0, 4, rows), "y": y})
+
+
+def test_words_and_weights_by_any_shards():
+    rows = mixed()
+    first = distributed.start(
+        ["a", "w"],
+        "y",
+        branch_rows=500,
+        block_rows=BLOCK,
+        levels={"w": ["high", "low", "mid"]},
+        weighted=True,
+        estimator=LocalLinearTreeRegressor(validity="crisp", max_leaves=6),
+    )
+    results = []
+    for limits in ([0, 1500], [0, 128, 1024, 1500]):
+        state = first
+        while distributed.status(state)["step"] != "finished":
+            parts = [
+                distributed.sums(state, of[["a", "w"]], of["y"], begin // BLOCK, sample_weight=of["k"])
+                for begin, end in itertools.pairwise(limits)
+                for of in [rows.iloc[begin:end]]
+            ]
+            state = distributed.advance(state, distributed.merge(parts))
+        results.append(state)
+    assert results[0] == results[1]
+    model = distributed.estimator(results[0])
+    errors = model.predict(rows[["a", "w"]]) - rows["y"]
+    assert np.sqrt(np.average(errors**2, weights=rows["k"])) < 2 * NOISE
+    with pytest.raises(ValueError, match='column "w" has 1 cells with a word that is none of the levels'):
+        distributed.sums(first, rows[["a", "w"]].head(1).assign(w="none"), rows["y"].head(1))
+    with pytest.raises(ValueError, match="0 weights of 1 rows"):
+        distributed.sums(first, rows[["a", "w"]].head(1), rows["y"].head(1))
+    with pytest.raises(ValueError, match='levels has "z", which is no input'):
+        distributed.start(["a", "w"], "y", levels={"z": ["low"]})
+
+
+@pytest.mark.parametrize("kind", ["frame", "category", "folder"])
+def test_dask_finds_words_and_takes_weights(tmp_path, kind):
+    dask = pytest.importorskip("dask")
+    frames = pytest.importorskip("dask.dataframe")
+    from llmt import dask as llmt_dask
+
+    rows = mixed()
+    # The first partition lacks a word that the others have, and one has no rows.
+    parts = [rows[:700][rows.w[:700] != "mid"], rows[:0], rows[700:]]
+    kept = rows.loc[[index for part in parts for index in part.index]]
+    if kind == "category":
+        parts = [part.astype({"w": "category"}) for part in parts]
+    expected = LocalLinearTreeRegressor(validity="crisp", max_leaves=6).fit(
+        kept[["a", "w"]], kept["y"], sample_weight=kept["k"].to_numpy(float)
+    )
+    with dask.config.set(scheduler="threads", num_workers=2):
+        if kind == "folder":
+            pytest.importorskip("pyarrow")
+            for number, part in enumerate(parts):
+                part.to_parquet(tmp_path / f"{number}.parquet")
+            table = tmp_path
+        else:
+            table = frames.from_delayed([dask.delayed(part) for part in parts], meta=parts[0].iloc[:0], verify_meta=False)
+        options = {"estimator": LocalLinearTreeRegressor(validity="crisp", max_leaves=6), "weight": "k"}
+        whole = llmt_dask.fit(table, "y", **options)
+        assert whole.to_json() == expected.to_json()
+        large = llmt_dask.fit(table, "y", branch_rows=400, block_rows=BLOCK, **options)
+        predicted = llmt_dask.predict(large, table).compute().to_numpy()
+    assert np.sqrt(np.average((predicted - kept["y"]) ** 2, weights=kept["k"])) < 2 * NOISE
+
+
+def test_partitions_of_other_kinds_are_named(tmp_path):
+    dask = pytest.importorskip("dask")
+    frames = pytest.importorskip("dask.dataframe")
+    from llmt import dask as llmt_dask
+
+    rows = mixed(300)
+
+    def refused(second, match):
+        parts = [dask.delayed(rows[:150]), dask.delayed(second)]
+        table = frames.from_delayed(parts, meta=rows.iloc[:0], verify_meta=False)
+        with pytest.raises((TypeError, ValueError), match=match), dask.config.set(scheduler="threads"):
+            llmt_dask.fit(table, "y", **OPTIONS)
+
+    refused(rows[150:].drop(columns="a"), 'partition 1: column "a" is missing')
+    refused(rows[150:].drop(columns="w"), 'partition 1: column "w" is missing')
+    refused(rows[150:].assign(w=1.0), 'partition 1: column "w" has numbers, and words in other partitions')
+    refused(rows[150:].assign(a="many"), 'partition 0: column "a" has numbers, and words in other partitions')
+    refused(rows[150:].assign(y="many"), 'partition 1: column "y" has words')
+    refused(rows[150:].assign(y=np.inf), r'partition 1, rows from 0: row 0, column "y" is inf')
+    refused(rows[150:].assign(a=-np.inf), r'partition 1, rows from 0: row 0, column "a" is -inf')
+    with pytest.raises(ValueError, match="no rows"), dask.config.set(scheduler="threads"):
+        llmt_dask.fit(frames.from_delayed([dask.delayed(rows[:0])], meta=rows.iloc[:0]), "y")

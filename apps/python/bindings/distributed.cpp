@@ -1,9 +1,11 @@
 #include "llmt/distributed.hpp"
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -20,24 +22,28 @@ namespace {
 using distributed::State;
 using distributed::Sums;
 
-constexpr const char* name_of_step[] = {"describe", "grow", "gather", "finished"};
-
 std::string_view view_of(const nb::bytes& bytes) { return {bytes.c_str(), bytes.size()}; }
 nb::bytes bytes_of(const std::string& text) { return nb::bytes(text.data(), text.size()); }
 
 nb::bytes start(std::vector<std::string> input_names, std::string output_name, Eigen::Index branch_rows,
-                Eigen::Index block_rows, const Options& options) {
-  const distributed::Options given{.branch_rows = branch_rows, .block_rows = block_rows, .fit = options_of(options)};
+                Eigen::Index block_rows, bool weighted, std::vector<std::vector<std::string>> levels,
+                const Options& options) {
+  const distributed::Options given{.branch_rows = branch_rows,
+                                   .block_rows = block_rows,
+                                   .weighted = weighted,
+                                   .levels = std::move(levels),
+                                   .fit = options_of(options)};
   return bytes_of(distributed::start(std::move(input_names), std::move(output_name), given).to_bytes());
 }
 
 nb::bytes sums(const nb::bytes& state, const Array& inputs, const Vector& output, Eigen::Index first_block,
-               int max_threads) {
+               int max_threads, const std::optional<Vector>& weights) {
   std::string bytes;
   {
     const nb::gil_scoped_release unlocked;
     const Eigen::VectorXd values = vector_of(output);
-    const distributed::Rows rows{rows_of(inputs), values, first_block};
+    const distributed::Rows rows{rows_of(inputs), values, first_block,
+                                 weights ? vector_of(*weights) : Eigen::VectorXd()};
     bytes = distributed::sums(rows, State::from_bytes(view_of(state)), max_threads).to_bytes();
   }
   return bytes_of(bytes);
@@ -69,13 +75,14 @@ nb::dict status(const nb::bytes& bytes) {
   const State state = State::from_bytes(view_of(bytes));
   const distributed::Counts counts = state.counts();
   nb::dict result;
-  result["step"] = name_of_step[static_cast<std::size_t>(state.step())];
+  result["step"] = std::string(name_of(state.step()));
   result["passes"] = counts.passes;
   result["rows"] = counts.rows;
   result["top_leaves"] = counts.top_leaves;
   result["branches"] = counts.branches;
   result["branches_done"] = counts.branches_done;
   result["rows_to_come"] = counts.rows_to_come;
+  result["is_of_sample"] = counts.is_of_sample;
   result["held_out_rmse"] = counts.held_out_rmse;
   return result;
 }
@@ -84,13 +91,14 @@ nb::dict status(const nb::bytes& bytes) {
 
 void add_distributed(nb::module_& module) {
   module.def("distributed_start", &start, nb::arg("input_names"), nb::arg("output_name"), nb::arg("branch_rows"),
-             nb::arg("block_rows"), nb::arg("options"));
+             nb::arg("block_rows"), nb::arg("weighted"), nb::arg("levels"), nb::arg("options"));
   module.def("distributed_sums", &sums, nb::arg("state"), nb::arg("inputs"), nb::arg("output"), nb::arg("first_block"),
-             nb::arg("max_threads"));
+             nb::arg("max_threads"), nb::arg("weights").none());
   module.def("distributed_merge", &merge, nb::arg("parts"));
   module.def("distributed_advance", &advance, nb::arg("state"), nb::arg("sums"), nb::arg("max_threads"),
              nb::arg("report"));
   module.def("distributed_status", &status, nb::arg("state"));
+  module.def("distributed_levels", [](const nb::bytes& state) { return State::from_bytes(view_of(state)).levels(); });
   module.def("distributed_model",
              [](const nb::bytes& state) { return State::from_bytes(view_of(state)).model_json(); });
   module.def("distributed_continues", [](const nb::bytes& state, const nb::bytes& first) {

@@ -10,7 +10,7 @@ import numpy as np
 from . import _core
 from ._model import BoostedModel
 from ._progress import Bar
-from ._regressor import TableRegressor, count, spread
+from ._regressor import FitRows, TableRegressor, count, spread
 from ._views import Views
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
 
     More accurate than one tree where the target has many steps or interactions; nobody reads it. Which trees are taken
     and how many there are is decided by the error on rows that are held out; then the sum is fitted to all rows
-    (docs/algorithms/boosting.md).
+    (docs/algorithms/boosting.md). A sum is fitted to each target.
 
     Inputs are those of `LocalLinearTreeRegressor`: numbers, words (categories by themselves, of at most 50 levels) and
     missing cells, in arrays and frames. What a sum has not: rules and equations, monotone inputs, a robust loss, learning
@@ -89,31 +89,8 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
         self.random_state = random_state
         self.n_jobs = n_jobs
 
-    def fit(
-        self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None, eval_set: Any = None
-    ) -> "BoostedLocalLinearTreeRegressor":
-        """Learns from a table.
-
-        Parameters
-        ----------
-        X : table, (rows, columns)
-            Inputs. NaN, None and null are missing; infinity is refused.
-        y : array, (rows,) or (rows, targets)
-            Targets, all finite. A sum is fitted to each.
-        sample_weight : array, (rows,), optional
-            Weight k counts as the row k times, weight 0 as a row that is not there.
-        groups : array, (rows,), optional
-            Rows with equal labels are held out together.
-        eval_set : tuple (X, y), optional
-            Choose by the error on these rows in the place of a fifth of the others. They do not enter the model.
-
-        Raises
-        ------
-        ValueError, TypeError
-            For what cannot be learned from; the message names the column or the parameter.
-        """
+    def _learn(self, rows: FitRows) -> None:
         options = self._options()
-        rows = self._read_rows(X, y, sample_weight, groups, eval_set, robust='LocalLinearTreeRegressor(loss="tukey")')
         with Bar() as bar:
             fitted = _core.boost(
                 rows.table.values,
@@ -127,7 +104,6 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
                 held_out=rows.held_out,
                 report=bar,
             )
-        self._take_rows(rows)
         self.model_ = BoostedModel(fitted.model())
         self.summary_ = json.loads(fitted.summary("table"))
         self._fit = fitted
@@ -135,9 +111,11 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
             warnings.warn(
                 "X has fewer than 10 rows that differ, too few for a sum of trees: the model is the mean of y. "
                 "LocalLinearTreeRegressor takes so few",
-                stacklevel=2,
+                stacklevel=3,
             )
-        return self
+
+    def _robust(self) -> str:
+        return 'LocalLinearTreeRegressor(loss="tukey")'
 
     @property
     def n_iter_(self) -> "int | np.ndarray":

@@ -10,7 +10,7 @@ from . import _advice, _core
 from ._frames import mean_baseline
 from ._model import Model, StreamModel, TextModel
 from ._progress import Bar
-from ._regressor import TableRegressor, check_rows, count, names_of, spread, target_names, weights_of
+from ._regressor import FitRows, TableRegressor, check_rows, count, names_of, spread, target_names, weights_of
 from ._tree_views import TreeViews
 from .tables import Table, read_table, read_targets
 
@@ -137,34 +137,11 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         self.random_state = random_state
         self.n_jobs = n_jobs
 
-    def fit(
-        self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None, eval_set: Any = None
-    ) -> "LocalLinearTreeRegressor":
-        """Learns from a table.
-
-        Parameters
-        ----------
-        X : table, (rows, columns)
-            Inputs. NaN, None and null are missing; infinity is refused.
-        y : array, (rows,) or (rows, targets)
-            Targets, all finite.
-        sample_weight : array, (rows,), optional
-            Weight k counts as the row k times, weight 0 as a row that is not there.
-        groups : array, (rows,), optional
-            Rows with equal labels are held out together.
-        eval_set : tuple (X, y), optional
-            Choose by the error on these rows in the place of folds. They do not enter the model.
-
-        Raises
-        ------
-        ValueError, TypeError
-            For what cannot be learned from; the message names the column or the parameter.
-        """
-        rows = self._read_rows(X, y, sample_weight, groups, eval_set, robust='loss="tukey"' if self.loss == "squared" else "")
+    def _learn(self, rows: FitRows) -> None:
         labels = rows.groups
         options = self._options(rows.table)
         if not isinstance(self.cv, (int, np.integer)) and not rows.held_out:
-            options["folds"], labels = _given_folds(self.cv, X, y, groups, rows.fitted)
+            options["folds"], labels = _given_folds(self.cv, *rows.given, rows.fitted)
         with Bar() as bar:
             fitted = _core.fit(
                 rows.table.values,
@@ -181,8 +158,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
                 report=bar,
             )
         if self.loss == "squared":
-            _advice.warn_of_gross_errors(fitted, rows.outputs, self._outputs, stacklevel=3)
-        self._take_rows(rows)
+            _advice.warn_of_gross_errors(fitted, rows.outputs, self._outputs, stacklevel=4)
         self.accurate_model_ = Model(fitted.model())
         readable = fitted.readable()
         self.model_ = self.accurate_model_ if readable is None else Model(readable)
@@ -191,7 +167,9 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         self._mean = mean_baseline(rows.outputs, fitted.held_out(), rows.weights)
         self._fit = fitted
         self._stream: StreamModel | None = None
-        return self
+
+    def _robust(self) -> str:
+        return 'loss="tukey"' if self.loss == "squared" else ""
 
     def partial_fit(self, X: Any, y: Any, sample_weight: Any = None) -> "LocalLinearTreeRegressor":
         """Learns from further rows as they come, in memory that does not depend on their number.

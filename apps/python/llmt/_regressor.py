@@ -28,6 +28,7 @@ class FitRows:
     groups: np.ndarray | None
     held_out: list[int]  # positions of the rows of an eval_set
     fitted: int  # rows without those
+    given: tuple[Any, Any, Any]  # X, y and groups as they were given
 
 
 class TableRegressor(RegressorMixin, BaseEstimator):
@@ -43,6 +44,32 @@ class TableRegressor(RegressorMixin, BaseEstimator):
         model_: Any
         summary_: dict[str, Any]
         _fit: Any
+
+    def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None, eval_set: Any = None) -> "Self":
+        """Learns from a table.
+
+        Parameters
+        ----------
+        X : table, (rows, columns)
+            Inputs. NaN, None and null are missing; infinity is refused.
+        y : array, (rows,) or (rows, targets)
+            Targets, all finite.
+        sample_weight : array, (rows,), optional
+            Weight k counts as the row k times, weight 0 as a row that is not there.
+        groups : array, (rows,), optional
+            Rows with equal labels are held out together.
+        eval_set : tuple (X, y), optional
+            Choose by the error on these rows, and hold out none of the others. They do not enter the model.
+
+        Raises
+        ------
+        ValueError, TypeError
+            For what cannot be learned from; the message names the column or the parameter.
+        """
+        rows = self._read_rows(X, y, sample_weight, groups, eval_set)
+        self._learn(rows)
+        self._take_rows(rows)
+        return self
 
     def predict(self, X: Any) -> np.ndarray:
         """Predictions, (rows,), or (rows, targets) where y had two dimensions."""
@@ -117,9 +144,16 @@ class TableRegressor(RegressorMixin, BaseEstimator):
         tags.target_tags.multi_output = True
         return tags
 
-    def _read_rows(self, X: Any, y: Any, sample_weight: Any, groups: Any, eval_set: Any, robust: str) -> "FitRows":
-        """Reads and checks what `fit` is given, and warns of what is probably not meant. `robust`: how a fit
-        that is robust to gross errors in y is asked for; empty: this one is."""
+    def _learn(self, rows: "FitRows") -> None:
+        """Makes model_ and summary_ of the rows, and keeps the fit."""
+        raise NotImplementedError
+
+    def _robust(self) -> str:
+        """How a fit that is robust to gross errors in y is asked for; empty: this one is."""
+        raise NotImplementedError
+
+    def _read_rows(self, X: Any, y: Any, sample_weight: Any, groups: Any, eval_set: Any) -> "FitRows":
+        """Reads and checks what `fit` is given, and warns of what is probably not meant."""
         table = read_table(X, categorical=self.categorical_features, owner=type(self).__name__)
         outputs, names = read_targets(y, owner=type(self).__name__)
         check_rows(len(table.values), len(outputs))
@@ -143,9 +177,9 @@ class TableRegressor(RegressorMixin, BaseEstimator):
             weights = None if weights is None else np.concatenate([weights, np.ones(len(judged))])
         meant = {str(name) for name in self.categorical_features}
         _advice.warn_of_accidental_inputs(table, meant, stacklevel=4)
-        _advice.check_targets(outputs, self._outputs, robust, stacklevel=4)
+        _advice.check_targets(outputs, self._outputs, self._robust(), stacklevel=4)
         _advice.warn_of_few_rows(rows, stacklevel=4)
-        return FitRows(table, outputs, weights, labels, held_out, rows)
+        return FitRows(table, outputs, weights, labels, held_out, rows, (X, y, groups))
 
     def _take_rows(self, rows: "FitRows") -> None:
         """Remembers of the rows of a fit what predictions and views need."""

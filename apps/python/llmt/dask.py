@@ -11,7 +11,7 @@ order and sizes of the partitions. Branches of the tree are fitted in the proces
 """
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,11 +21,11 @@ import numpy as np
 from . import _core, distributed
 from ._estimator import LocalLinearTreeRegressor
 from ._files import write_bytes
+from ._shards import columns_of, count_rows, sum_rows, words_of
 
 __all__ = ["fit", "predict"]
 
 _merged_at_once = 8
-_blocks_at_once = 4
 
 
 def fit(
@@ -33,6 +33,7 @@ def fit(
     target: str,
     *,
     inputs: Sequence[str] | None = None,
+    weight: str | None = None,
     estimator: LocalLinearTreeRegressor | None = None,
     branch_rows: int = 4_000_000,
     block_rows: int = 65_536,
@@ -46,12 +47,14 @@ def fit(
     Parameters
     ----------
     table : dask.dataframe.DataFrame, or path of a folder
-        All columns that are used hold numbers. A folder stands for its files ``*.parquet`` in the order of their names;
+        Target and weight hold numbers, inputs numbers or words, of which at most 255 may differ. A folder stands for its files ``*.parquet`` in the order of their names;
         each is read piece by piece, and may be larger than a worker's memory. A partition of a frame must fit.
     target : str
         The column to predict.
     inputs : sequence of str, optional
         Columns to predict from; by default all others.
+    weight : str, optional
+        The column of the rows' weights, as ``sample_weight`` of `LocalLinearTreeRegressor.fit`.
     estimator, branch_rows, block_rows
         As for :func:`llmt.distributed.start`. Partitions of a multiple of ``block_rows`` rows are summed fastest.
     client : distributed.Client, optional
@@ -74,17 +77,28 @@ def fit(
         Naming the partition or file, its row and column, or the pass. No model is left half done.
     """
     parts, columns = _partitions(table)
-    chosen = [name for name in columns if name != target] if inputs is None else list(inputs)
-    for name in [*chosen, target]:
+    chosen = [name for name in columns if name not in (target, weight)] if inputs is None else list(inputs)
+    named = [*chosen, target] if weight is None else [*chosen, target, weight]
+    for name in named:
         if name not in columns:
             raise ValueError(f'there is no column "{name}"; the columns are {", ".join(columns)}')
-    state = distributed.start(chosen, target, branch_rows=branch_rows, block_rows=block_rows, estimator=estimator)
+    run = _Engine(client, timeout)
+    found = run(_gathered([_task(words_of, part, chosen) for part in parts]), "looking for words")
+    words = {name: sorted({word for of_part in found for word in of_part.get(name, [])}) for name in chosen}
+    state = distributed.start(
+        chosen,
+        target,
+        branch_rows=branch_rows,
+        block_rows=block_rows,
+        levels={name: levels for name, levels in words.items() if levels},
+        weighted=weight is not None,
+        estimator=estimator,
+    )
     if resume:
         if checkpoint is None:
             raise ValueError("resume goes on from the file of checkpoint, which is not given")
         state = _saved(checkpoint, state)
-    run = _Engine(client, timeout)
-    rows: list[int] = run(_gathered([_task(_count_rows, part) for part in parts]), "counting rows")
+    rows: list[int] = run(_gathered([_task(count_rows, part) for part in parts]), "counting rows")
     blocks = [-(-count // block_rows) for count in rows]
     first = [sum(blocks[:position]) for position in range(len(blocks))]
     if not any(rows):
@@ -92,7 +106,7 @@ def fit(
     while (now := distributed.status(state))["step"] != "finished":
         shared = _constant(state)
         sums = [
-            _task(_sum_rows, part, shared, chosen, target, block_rows, begin, count)
+            _task(sum_rows, part, shared, named, weight is not None, block_rows, begin, count)
             for part, begin, count in zip(parts, first, rows, strict=True)
             if count
         ]
@@ -129,7 +143,7 @@ def _partitions(table: Any) -> tuple[list[_Partition], list[str]]:
     """The partitions of a table, and its columns."""
     if isinstance(table, (str, os.PathLike)):
         files = _parquet_files(table)
-        return [_Partition(file, file) for file in files], _parquet(files[0]).schema_arrow.names
+        return [_Partition(file, file) for file in files], columns_of(files[0])
     if not hasattr(table, "to_delayed"):
         raise TypeError(f"a table is a Dask DataFrame or the path of a folder, not {type(table).__name__}")
     frames = enumerate(table.to_delayed())
@@ -144,16 +158,6 @@ def _parquet_files(folder: "str | os.PathLike[str]") -> list[str]:
     if not files:
         raise FileNotFoundError(f"{path}: the folder has no file *.parquet")
     return files
-
-
-def _parquet(path: str) -> Any:
-    from pyarrow import ArrowException
-    from pyarrow.parquet import ParquetFile
-
-    try:
-        return ParquetFile(path)
-    except (ArrowException, OSError) as error:
-        raise type(error)(f"{path}: {error}") from None
 
 
 def _saved(checkpoint: "str | os.PathLike[str]", first: bytes) -> bytes:
@@ -171,58 +175,7 @@ def _saved(checkpoint: "str | os.PathLike[str]", first: bytes) -> bytes:
     return state
 
 
-# What tasks do.
-
-
-def _count_rows(source: Any, name: str) -> int:
-    return _parquet(source).metadata.num_rows if isinstance(source, str) else len(source)
-
-
-def _sum_rows(
-    source: Any, name: str, state: bytes, inputs: list[str], target: str, block_rows: int, first_block: int, rows: int
-) -> bytes:
-    """The sums of a partition, which has `rows` rows."""
-    sums = []
-    begin = 0
-    for piece in _pieces(source, name, [*inputs, target], _blocks_at_once * block_rows):
-        block = first_block + begin // block_rows
-        try:
-            sums.append(_core.distributed_sums(state, piece[:, :-1], piece[:, -1], block, 1))
-        except ValueError as error:
-            raise ValueError(f"{name}, rows from {begin}: {error}") from None
-        begin += len(piece)
-    if begin != rows:
-        raise ValueError(f"{name}: has {begin} rows, and had {rows}: the table changed")
-    return distributed.merge(sums)
-
-
-def _pieces(source: Any, name: str, columns: list[str], rows: int) -> Iterator[np.ndarray]:
-    """The columns as numbers, `rows` rows at a time."""
-    if not isinstance(source, str):
-        values = _numbers(source, name, columns)
-        for begin in range(0, len(values), rows):
-            yield values[begin : begin + rows]
-        return
-    held: list[np.ndarray] = []
-    for batch in _parquet(source).iter_batches(batch_size=rows, columns=columns):
-        held.append(_numbers(batch.to_pandas(), name, columns))
-        if sum(map(len, held)) >= rows:
-            values = np.concatenate(held)
-            yield values[:rows]
-            held = [values[rows:]]
-    if held and sum(map(len, held)):
-        yield np.concatenate(held)
-
-
-def _numbers(frame: Any, name: str, columns: list[str]) -> np.ndarray:
-    values = np.empty((len(frame), len(columns)), order="F")
-    for position, column in enumerate(columns):
-        try:
-            values[:, position] = frame[column].to_numpy(dtype=float, na_value=np.nan)
-        except (KeyError, TypeError, ValueError):
-            what = "has words or other cells that are no numbers" if column in frame else "is missing"
-            raise ValueError(f'{name}: column "{column}" {what}') from None
-    return values
+# Graphs of Dask.
 
 
 def _predict_rows(frame: Any, model: LocalLinearTreeRegressor, name: str) -> Any:
@@ -230,9 +183,6 @@ def _predict_rows(frame: Any, model: LocalLinearTreeRegressor, name: str) -> Any
 
     values = model.predict(frame[model._inputs]) if len(frame) else np.empty(0)
     return Series(values, index=frame.index, name=name, dtype="f8")
-
-
-# Graphs of Dask.
 
 
 def _constant(value: Any) -> Any:

@@ -19,7 +19,7 @@ array([1.5])
 What cannot be done beyond one memory is refused by its name: docs/algorithms/distributed.md.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ from .tables import read_table, read_targets
 __all__ = ["advance", "estimator", "merge", "start", "status", "sums"]
 
 _refused = {
-    "categorical_features": "give their columns as numbers, 0 or 1 for each category",
+    "categorical_features": "name their categories by levels",
     "monotonic_cst": "fit a sample that fits into memory",
     "readable": "fit a sample that fits into memory",
 }
@@ -45,6 +45,8 @@ def start(
     *,
     branch_rows: int = 4_000_000,
     block_rows: int = 65_536,
+    levels: Mapping[str, Sequence[str]] | None = None,
+    weighted: bool = False,
     estimator: LocalLinearTreeRegressor | None = None,
 ) -> bytes:
     """The state before the first pass.
@@ -59,6 +61,10 @@ def start(
         no more rows becomes the model of `LocalLinearTreeRegressor.fit`, to the byte.
     block_rows : int
         Rows of a block, of which sums are made.
+    levels : mapping of str to sequence of str, optional
+        The categories of the inputs that hold words, at most 255 of each: all that occur in the table.
+    weighted : bool
+        Whether rows have weights.
     estimator : LocalLinearTreeRegressor, optional
         Its parameters are those of the fit.
 
@@ -74,21 +80,31 @@ def start(
     if not isinstance(given.cv, int):
         raise ValueError("cv must be a number of folds beyond one memory; rows cannot be dealt by hand")
     names = [inputs] if isinstance(inputs, str) else [str(name) for name in inputs]
-    return _core.distributed_start(names, str(target), branch_rows, block_rows, given._options_without_columns())
+    by_name = {str(name): [str(level) for level in of_input] for name, of_input in (levels or {}).items()}
+    for name in by_name:
+        if name not in names:
+            raise ValueError(f'levels has "{name}", which is no input; the inputs are {", ".join(names)}')
+    of_inputs = [by_name.get(name, []) for name in names]
+    options = given._options_without_columns()
+    return _core.distributed_start(names, str(target), branch_rows, block_rows, weighted, of_inputs, options)
 
 
-def sums(state: bytes, X: Any, y: Any, first_block: int = 0, *, max_threads: int = 1) -> bytes:
+def sums(
+    state: bytes, X: Any, y: Any, first_block: int = 0, *, sample_weight: Any = None, max_threads: int = 1
+) -> bytes:
     """What `state` asks of some rows.
 
     Parameters
     ----------
     X : table, (rows, inputs)
-        Numbers, in the order of `start`.
+        Columns in the order of `start`: words where `start` was given levels, else numbers.
     y : array, (rows,)
     first_block : int
         The rows make the blocks ``first_block``, ``first_block + 1``, ... of ``block_rows`` rows each; the last one may
         have fewer. All blocks 0, 1, 2, ... of the table take part in every pass, each once; which of them are summed
         together, and where, changes no byte. A shard without rows has no block.
+    sample_weight : array, (rows,), optional
+        As for `LocalLinearTreeRegressor.fit`, if `start` was told of weights. A row of weight 0 takes no part.
     max_threads : int
         0: all that the process may use.
 
@@ -97,17 +113,21 @@ def sums(state: bytes, X: Any, y: Any, first_block: int = 0, *, max_threads: int
     ValueError
         Naming row and column of what cannot be learned from.
     """
+    weights = None if sample_weight is None else np.asarray(sample_weight, dtype=float)
     if len(X) == 0:
-        return _core.distributed_sums(state, np.empty(np.shape(X)), np.empty(0), first_block, max_threads)
-    table = read_table(X)
-    for position, levels in enumerate(table.levels):
-        if levels:
-            name = position if table.names is None else table.names[position]
-            raise ValueError(f'column "{name}" has words; beyond one memory inputs are numbers')
+        return _core.distributed_sums(state, np.empty(np.shape(X)), np.empty(0), first_block, max_threads, weights)
+    levels = _core.distributed_levels(state)
+    table = read_table(X, levels=levels) if any(levels) else read_table(X)
+    for position, unknown in enumerate(table.unknown):
+        name = position if table.names is None else table.names[position]
+        if table.levels[position] and not levels[position]:
+            raise ValueError(f'column "{name}" has words, and start was not given their levels')
+        if unknown:
+            raise ValueError(f'column "{name}" has {unknown} cells with a word that is none of the levels of start')
     output, _ = read_targets(y)
     if output.ndim != 1:
         raise ValueError("y has several columns; beyond one memory there is one target")
-    return _core.distributed_sums(state, table.values, output, first_block, max_threads)
+    return _core.distributed_sums(state, table.values, output, first_block, max_threads, weights)
 
 
 def merge(parts: Iterable[bytes]) -> bytes:
@@ -133,9 +153,10 @@ def status(state: bytes) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``step``: what the next pass does, "describe", "grow" or "gather", or "finished"; ``passes`` so far; ``rows`` of
+        ``step``: what the next pass does, "describe", "grow", "gather" or "blend", or "finished"; ``passes`` so far; ``rows`` of
         the table, 0 before the first pass; ``top_leaves`` of the top of the tree; ``branches`` among them that are
-        fitted in memory, and ``branches_done``; ``rows_to_come``, which the next pass brings together; and
+        fitted in memory, and ``branches_done``; ``rows_to_come``, which the next pass brings together; ``is_of_sample``, whether the model is the tree of the
+        sample in place of top and branches; and
         ``held_out_rmse`` of the finished model.
     """
     result: dict[str, Any] = _core.distributed_status(state)

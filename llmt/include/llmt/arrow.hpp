@@ -1,5 +1,5 @@
 /// \file
-/// Tables of numbers in Arrow IPC files (Feather version 2, not compressed), which need not fit into memory.
+/// Tables of numbers and text in Arrow IPC files (Feather version 2, not compressed), which need not fit into memory.
 ///
 ///     const llmt::ArrowTable table = llmt::ArrowTable::open("rows.arrow");
 ///     const Eigen::MatrixXd first = table.read(0, 1000, std::vector<std::string>{"x", "y"});
@@ -19,7 +19,8 @@
 namespace llmt {
 
 /// An Arrow IPC file of flat columns, opened for reading. What is read are integers of 8 to 64 bits and floating-point
-/// numbers of 32 and 64 bits, with or without missing values; columns of text, dates and other flat types may be there.
+/// numbers of 32 and 64 bits, and text, whole or by a dictionary, with or without missing values; columns of dates and
+/// other flat types may be there.
 /// Copies share the file. It may be used by several threads at a time.
 ///
 /// Source: the Arrow columnar format, versions 1.0 and later (metadata version 5; 4 is read, too).
@@ -38,6 +39,12 @@ class ArrowTable {
   /// std::runtime_error `path: ...` for a column that does not exist or holds no numbers, and if the file cannot be
   /// read; std::invalid_argument for rows that do not exist.
   Eigen::MatrixXd read(Eigen::Index first, Eigen::Index count, std::span<const std::string> columns) const;
+
+  /// Whether a column holds text. Throws std::runtime_error as read() for one that does not exist.
+  bool has_text(const std::string& column) const;
+
+  /// The cells of a column of text; empty where one is missing. Throws as read().
+  std::vector<std::string> texts(Eigen::Index first, Eigen::Index count, const std::string& column) const;
 
   struct Parts;
 

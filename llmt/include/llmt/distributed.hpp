@@ -15,12 +15,14 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "llmt/abi.hpp"
 #include "llmt/model.hpp"
+#include "llmt/names.hpp"
 #include "llmt/options.hpp"
 #include "llmt/progress.hpp"
 
@@ -31,6 +33,10 @@ struct Options {
   /// 100. A table with no more rows becomes the model of fit(), to the byte.
   Eigen::Index branch_rows = 4'000'000;
   Eigen::Index block_rows = 65536;  ///< of a block, of which sums are made; see Rows
+  bool weighted = false;            ///< whether rows have weights
+  /// Of each input the names of its categories, which its values number from 0 on, as TrainingData::levels; at most
+  /// 255, in all of the table. No names: a number. Empty: all are numbers.
+  std::vector<std::vector<std::string>> levels = {};
   /// Of the branches. What start() refuses is not possible beyond one memory; max_threads may differ from pass to pass
   /// and is not kept.
   FitOptions fit = {};
@@ -43,6 +49,8 @@ struct Rows {
   Eigen::Ref<const Eigen::MatrixXd> inputs;  ///< rows x inputs, finite; NaN: missing, see advance()
   Eigen::Ref<const Eigen::VectorXd> output;  ///< one a row, finite
   Eigen::Index first_block = 0;
+  /// One a row, not negative, if Options::weighted says so; as TrainingData::weights: a row of weight 0 takes no part.
+  Eigen::VectorXd weights = {};
 };
 
 /// What a state is about to do.
@@ -50,8 +58,18 @@ enum class Step {
   describe,  ///< the next pass finds means, ranges and a sample of the rows
   grow,      ///< the next pass sums bins of the nodes that are split next
   gather,    ///< the next pass brings the rows of some branches together
+  blend,     ///< the next pass fits the tree of the sample to all rows
   finished   ///< there is a model
 };
+
+}  // namespace llmt::distributed
+
+namespace llmt {
+template <>
+std::span<const Choice<distributed::Step>> choices();
+}  // namespace llmt
+
+namespace llmt::distributed {
 
 /// How far a fit is.
 struct Counts {
@@ -62,6 +80,7 @@ struct Counts {
   Eigen::Index branches_done = 0;  ///< and has finished
   Eigen::Index rows_to_come = 0;   ///< rows that the next pass brings together
   double held_out_rmse = 0.0;      ///< of the model: of branches and leaves, weighted by rows; NaN: nothing held out
+  bool is_of_sample = false;       ///< the model is the tree of the sample, in place of top and branches
 };
 
 struct StateData;
@@ -73,6 +92,9 @@ class State {
   Step step() const;
   bool finished() const { return step() == Step::finished; }
   Counts counts() const;
+
+  /// Options::levels, one entry an input.
+  std::vector<std::vector<std::string>> levels() const;
 
   /// Throws std::invalid_argument before the last pass.
   const Model& model() const;

@@ -17,6 +17,7 @@ inline constexpr int header_type = 1;
 inline constexpr int header = 2;
 inline constexpr int body_length = 3;
 inline constexpr std::uint8_t is_schema = 1;
+inline constexpr std::uint8_t is_dictionary = 2;
 inline constexpr std::uint8_t is_batch = 3;
 }  // namespace message
 
@@ -38,12 +39,25 @@ namespace type {
 inline constexpr std::uint8_t null = 1;
 inline constexpr std::uint8_t integer = 2;
 inline constexpr std::uint8_t floating = 3;
-inline constexpr int bit_width = 0;  ///< of an integer
+inline constexpr std::uint8_t text = 5;         ///< UTF-8, with offsets of 32 bits
+inline constexpr std::uint8_t large_text = 20;  ///< with offsets of 64 bits
+inline constexpr int bit_width = 0;             ///< of an integer
 inline constexpr int is_signed = 1;
 inline constexpr int precision = 0;  ///< of a floating-point number
 inline constexpr std::int16_t single_precision = 1;
 inline constexpr std::int16_t double_precision = 2;
 }  // namespace type
+
+namespace dictionary {  // DictionaryEncoding of a field
+inline constexpr int id = 0;
+inline constexpr int index_type = 1;
+}  // namespace dictionary
+
+namespace dictionary_batch {
+inline constexpr int id = 0;
+inline constexpr int data = 1;
+inline constexpr int is_delta = 2;
+}  // namespace dictionary_batch
 
 namespace batch {
 inline constexpr int length = 0;
@@ -55,6 +69,7 @@ inline constexpr int compression = 3;
 namespace footer {
 inline constexpr int version = 0;
 inline constexpr int schema = 1;
+inline constexpr int dictionaries = 2;
 inline constexpr int batches = 3;
 }  // namespace footer
 

@@ -159,8 +159,8 @@ struct Extent {
     high = value > high ? value : high;
   }
   Extent& operator+=(const Extent& other) {
-    widen(other.low);
-    widen(other.high);
+    low = other.low < low ? other.low : low;
+    high = other.high > high ? other.high : high;
     return *this;
   }
 };

@@ -1,8 +1,10 @@
 // The leaves of a tree whose splits are there.
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include "base/parallel.hpp"
 #include "boosted/growing_tree.hpp"
@@ -39,8 +41,11 @@ bool is_soft(const GrowingTree& tree) {
   return std::ranges::any_of(tree, [](const GrowingNode& node) { return node.half_width > 0.0; });
 }
 
+using Slopes = std::array<double, most_boosted_slopes>;
+using SquareOfSlopes = std::array<Slopes, most_boosted_slopes>;
+
 // Solves the positive definite system a x = b in place of b (Cholesky).
-void solve(double (&a)[most_boosted_slopes][most_boosted_slopes], double (&b)[most_boosted_slopes], int size) {
+void solve(SquareOfSlopes& a, Slopes& b, int size) {
   for (int j = 0; j < size; ++j) {
     for (int k = 0; k < j; ++k) {
       for (int i = j; i < size; ++i) a[i][j] -= a[i][k] * a[j][k];
@@ -58,64 +63,98 @@ void solve(double (&a)[most_boosted_slopes][most_boosted_slopes], double (&b)[mo
   }
 }
 
+// Over the rows of a leaf, e the residual of its path's model and z its regressors.
+struct RegressorSums {
+  double n = 0.0;                                        // of weights w
+  double s = 0.0;                                        // of w e
+  double low = std::numeric_limits<double>::infinity();  // of the outputs of rows that are mostly in the leaf
+  double high = -std::numeric_limits<double>::infinity();
+  Slopes z = {};           // of w z
+  Slopes ze = {};          // of w z e
+  SquareOfSlopes zz = {};  // of w z z'
+};
+
+// The compiler knows the number of slopes and unrolls the loops over them.
+template <int size, bool is_soft, bool is_weighted>
+RegressorSums regressor_sums(const PathModel& model, const BinnedRows& all, std::span<const int> rows,
+                             std::span<const double> shares, const Eigen::VectorXd& residuals) {
+  RegressorSums sums;
+  std::array<const float*, size> values;
+  std::array<double, size> slopes;
+  for (int j = 0; j < size; ++j) {
+    values[j] = all.features[model.features[j]].values.data();
+    slopes[j] = model.slopes[j];
+  }
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const Eigen::Index row = rows[k];
+    const double weight = is_weighted ? all.weights(row) : 1.0;
+    const double w = is_soft ? shares[k] * weight : weight;
+    const double residual = residuals(row);
+    if (!is_soft || shares[k] >= 0.5) {
+      sums.low = std::min(sums.low, residual);
+      sums.high = std::max(sums.high, residual);
+    }
+    std::array<double, size> z;
+    double e = residual - model.constant;
+    for (int j = 0; j < size; ++j) {
+      z[j] = values[j][row];
+      e -= slopes[j] * z[j];
+    }
+    sums.n += w;
+    sums.s += w * e;
+    for (int j = 0; j < size; ++j) {
+      const double weighted = w * z[j];
+      sums.z[j] += weighted;
+      sums.ze[j] += weighted * e;
+      for (int i = 0; i <= j; ++i) sums.zz[j][i] += w * z[j] * z[i];
+    }
+  }
+  return sums;
+}
+
+// Calls of(size) with the size, up to `most`, as a constant.
+template <int most, class Of>
+auto with_size(int size, const Of& of) {
+  if constexpr (most > 0) {
+    if (size < most) return with_size<most - 1>(size, of);
+  }
+  return of(std::integral_constant<int, most>());
+}
+
 }  // namespace
 
 // beta += (Z'Z + ridge I)^-1 Z'e about the path's model, all centred in the leaf.
 void TreeGrower::fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::span<const double> shares,
                           const Eigen::VectorXd& residuals) const {
   const int size = static_cast<int>(leaf.model.features.size());
-  double n = 0.0;
-  double s = 0.0;
-  double mean[most_boosted_slopes] = {};
-  double zz[most_boosted_slopes][most_boosted_slopes] = {};
-  double ze[most_boosted_slopes] = {};
-  double low = std::numeric_limits<double>::infinity();
-  double high = -low;
-  const float* values[most_boosted_slopes];
-  for (int j = 0; j < size; ++j) values[j] = rows_.features[leaf.model.features[j]].values.data();
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const Eigen::Index row = rows[k];
-    const double w = shares.empty() ? rows_.weights(row) : shares[k] * rows_.weights(row);
-    const double residual = residuals(row);
-    if (shares.empty() || shares[k] >= 0.5) {
-      low = std::min(low, residual);
-      high = std::max(high, residual);
-    }
-    double z[most_boosted_slopes];
-    double e = residual - leaf.model.constant;
-    for (int j = 0; j < size; ++j) {
-      z[j] = values[j][row];
-      e -= leaf.model.slopes[j] * z[j];
-    }
-    n += w;
-    s += w * e;
-    for (int j = 0; j < size; ++j) {
-      mean[j] += w * z[j];
-      ze[j] += w * z[j] * e;
-      for (int i = j; i < size; ++i) zz[i][j] += w * z[i] * z[j];
-    }
+  auto [n, s, low, high, mean, ze, zz] = with_size<most_boosted_slopes>(size, [&](auto fixed) {
+    const auto sums = [&](auto is_soft, auto is_weighted) {
+      return regressor_sums<fixed(), is_soft(), is_weighted()>(leaf.model, rows_, rows, shares, residuals);
+    };
+    using std::false_type;
+    using std::true_type;
+    if (rows_.equal_weights) return shares.empty() ? sums(false_type(), false_type()) : sums(true_type(), false_type());
+    return shares.empty() ? sums(false_type(), true_type()) : sums(true_type(), true_type());
+  });
+  for (int j = 0; j < size; ++j) mean[j] /= n;
+  for (int j = 0; j < size; ++j) {
+    ze[j] -= mean[j] * s;
+    for (int i = j; i < size; ++i) zz[i][j] -= n * mean[i] * mean[j];
+    zz[j][j] += options_.ridges.slope;
   }
-  {
-    for (int j = 0; j < size; ++j) mean[j] /= n;
-    for (int j = 0; j < size; ++j) {
-      ze[j] -= mean[j] * s;
-      for (int i = j; i < size; ++i) zz[i][j] -= n * mean[i] * mean[j];
-      zz[j][j] += options_.ridges.slope;
-    }
-    solve(zz, ze, size);
-    const double constant = s / (n + options_.ridges.constant);
-    leaf.model.constant += constant;
-    double middle = leaf.model.constant;
-    for (int j = 0; j < size; ++j) {
-      leaf.model.constant -= ze[j] * mean[j];
-      leaf.model.slopes[j] += ze[j];
-    }
-    for (int j = 0; j < size; ++j) middle += (leaf.model.slopes[j] - ze[j]) * mean[j];
-    if (low > high) low = high = middle;
-    const double margin = 0.1 * (high - low);
-    leaf.low = std::min(low - margin, middle);
-    leaf.high = std::max(high + margin, middle);
+  solve(zz, ze, size);
+  const double constant = s / (n + options_.ridges.constant);
+  leaf.model.constant += constant;
+  double middle = leaf.model.constant;
+  for (int j = 0; j < size; ++j) {
+    leaf.model.constant -= ze[j] * mean[j];
+    leaf.model.slopes[j] += ze[j];
   }
+  for (int j = 0; j < size; ++j) middle += (leaf.model.slopes[j] - ze[j]) * mean[j];
+  if (low > high) low = high = middle;
+  const double margin = 0.1 * (high - low);
+  leaf.low = std::min(low - margin, middle);
+  leaf.high = std::max(high + margin, middle);
 }
 
 // A leaf without rows keeps its path's model within the range of the rows of the nearest node above.
@@ -127,52 +166,6 @@ void TreeGrower::hold_empty(GrowingNode& leaf, const Eigen::VectorXd& residuals)
   for (Eigen::Index k = tree_[above].begin; k < tree_[above].end; ++k) {
     leaf.low = std::min(leaf.low, residuals(order_[k]));
     leaf.high = std::max(leaf.high, residuals(order_[k]));
-  }
-}
-
-// The same shares as visit(), node by node.
-void TreeGrower::share_rows() {
-  if (soft_rows_.size() < tree_.size()) soft_rows_.resize(tree_.size());
-  soft_rows_[0].rows = of_rows_;
-  soft_rows_[0].shares.assign(of_rows_.size(), 1.0);
-  for (std::size_t index = 0; index < tree_.size(); ++index) {
-    const GrowingNode& node = tree_[index];
-    if (node.feature < 0) continue;
-    const BinnedFeature& column = rows_.features[node.feature];
-    const double threshold = column.edges[node.cell];
-    const SoftRows& here = soft_rows_[index];
-    SoftRows& left = soft_rows_[node.left];
-    SoftRows& right = soft_rows_[node.right];
-    for (SoftRows* side : {&left, &right}) {
-      side->rows.resize(here.rows.size());
-      side->shares.resize(here.rows.size());
-    }
-    std::size_t in_left = 0;
-    std::size_t in_right = 0;
-    // Without branches, which no processor could foresee: the row is written to both sides, and counts where it
-    // belongs.
-    for (std::size_t k = 0; k < here.rows.size(); ++k) {
-      const int row = here.rows[k];
-      const double share = here.shares[k];
-      const std::uint16_t cell = column.cells[row];
-      const double z = column.values[row];
-      const bool is_missing = cell == missing_cell;
-      const bool is_right = is_missing ? !node.missing_left : cell > node.cell;
-      const double soft = share_of_right(z, threshold, node.half_width);
-      // Sums and products of 0 and 1 in place of branches, which would be guessed wrongly.
-      const int both = static_cast<int>(!is_missing) * static_cast<int>(std::abs(z - threshold) < node.half_width) *
-                       static_cast<int>(goes_both_ways(share, soft));
-      const double to_right = both != 0 ? soft : (is_right ? 1.0 : 0.0);
-      left.rows[in_left] = right.rows[in_right] = row;
-      left.shares[in_left] = share * (1.0 - to_right);
-      right.shares[in_right] = share * to_right;
-      in_left += std::max(both, static_cast<int>(!is_right));
-      in_right += std::max(both, static_cast<int>(is_right));
-    }
-    left.rows.resize(in_left);
-    left.shares.resize(in_left);
-    right.rows.resize(in_right);
-    right.shares.resize(in_right);
   }
 }
 
@@ -191,7 +184,7 @@ void TreeGrower::fit_leaves(const Eigen::VectorXd& residuals) {
 }
 
 TreeGrower::RowsInLeaf TreeGrower::rows_in(const GrowingTree& tree, int leaf) const {
-  if (is_soft_) return {soft_rows_[leaf].rows, soft_rows_[leaf].shares};
+  if (is_soft_) return {soft_rows_[leaf].of_rows(), soft_rows_[leaf].of_shares()};
   return {std::span(order_).subspan(tree[leaf].begin, tree[leaf].count()), {}};
 }
 

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "base/parallel.hpp"
-#include "boosted/model/transition.hpp"
 
 namespace llmt {
 
@@ -127,9 +126,10 @@ void TreeGrower::add_to_path(GrowingNode& side, int feature) {
   double z = 0.0;
   double zz = 0.0;
   double ze = 0.0;
+  std::vector<double>& waiting = spare_residuals_;  // has nothing now in the places of these rows
   for (Eigen::Index k = side.begin; k < side.end; ++k) {
     const double w = weights_[k];
-    const double value = values[order_[k]];
+    const double value = waiting[k] = values[order_[k]];
     n += w;
     s += w * residuals_[k];
     z += w * value;
@@ -150,51 +150,9 @@ void TreeGrower::add_to_path(GrowingNode& side, int feature) {
     }
   }
   for (Eigen::Index k = side.begin; k < side.end; ++k) {
-    residuals_[k] -= constant + slope * values[order_[k]];
+    residuals_[k] -= constant + slope * waiting[k];
     terms_[k] = packed(residuals_[k], weights_[k], units_);
   }
-}
-
-double TreeGrower::half_width_of(int index) const {
-  const GrowingNode& node = tree_[index];
-  const BinnedFeature& column = rows_.features[node.feature];
-  const double threshold = column.edges[node.cell];
-  double low = column.low;
-  double high = column.high;
-  for (int below = index, above = node.parent; above >= 0; below = above, above = tree_[above].parent) {
-    if (tree_[above].feature != node.feature) continue;
-    const double border = column.edges[tree_[above].cell];
-    if (tree_[above].left == below) {
-      high = std::min(high, border);
-    } else {
-      low = std::max(low, border);
-    }
-  }
-  return std::max(0.0, options_.softness * std::min(threshold - low, high - threshold));
-}
-
-// Whether the rows in the transition are predicted about as well by both children's models blended.
-bool TreeGrower::blends_well(int index, double half_width) const {
-  constexpr double allowed = 1.1;
-  const GrowingNode& node = tree_[index];
-  const BinnedFeature& column = rows_.features[node.feature];
-  const double threshold = column.edges[node.cell];
-  double crisp = 0.0;
-  double blended = 0.0;
-  for (Eigen::Index k = node.begin; k < node.end; ++k) {
-    const Eigen::Index row = order_[k];
-    const double z = column.values[row];
-    if (column.cells[row] == missing_cell || std::abs(z - threshold) >= half_width) continue;
-    const bool is_left = column.cells[row] <= node.cell;
-    const double right_share = share_of_right(z, threshold, half_width);
-    const GrowingNode& own = tree_[is_left ? node.left : node.right];
-    const GrowingNode& other = tree_[is_left ? node.right : node.left];
-    const double share = is_left ? right_share : 1.0 - right_share;
-    const double residual = residuals_[k] - share * (other.model.at(rows_, row) - own.model.at(rows_, row));
-    crisp += weights_[k] * residuals_[k] * residuals_[k];
-    blended += weights_[k] * residual * residual;
-  }
-  return blended <= allowed * crisp;
 }
 
 void TreeGrower::split(std::span<const int> leaves, std::span<const Choice> choices) {

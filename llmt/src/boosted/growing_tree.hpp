@@ -88,8 +88,17 @@ class TreeGrower {
     std::span<const double> shares;  // empty: all 1
   };
   struct SoftRows {
-    std::vector<int> rows;
+    std::vector<int> rows;  // the first `count`; there may be room for more
     std::vector<double> shares;
+    std::size_t count = 0;
+
+    void make_room(std::size_t most) {
+      if (rows.size() >= most) return;
+      rows.resize(most);
+      shares.resize(most);
+    }
+    std::span<const int> of_rows() const { return std::span(rows).first(count); }
+    std::span<const double> of_shares() const { return std::span(shares).first(count); }
   };
 
   void begin(const Eigen::VectorXd& residuals);
@@ -107,6 +116,7 @@ class TreeGrower {
   void grow_free(Random& random);
   void fit_leaves(const Eigen::VectorXd& residuals);
   void share_rows();
+  void share_rows_of(int node);
   void fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::span<const double> shares,
                 const Eigen::VectorXd& residuals) const;
   RowsInLeaf rows_in(const GrowingTree& tree, int leaf) const;

@@ -19,6 +19,7 @@ PackedUnits units_of(std::span<const double> residuals, std::span<const double> 
   if (!equal_weights) units.weight = weight / most_weight;
   units.most = 2.0 * most_residual / static_cast<double>(residuals.size());
   if (largest > 0.0) units.residual = 2.0 * largest / units.most;
+  units.per_weight = 1.0 / units.weight;
   units.per_residual = 1.0 / units.residual;
   return units;
 }

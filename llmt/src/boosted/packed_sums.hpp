@@ -26,6 +26,7 @@ inline constexpr std::int64_t most_boosted_rows = std::int64_t{1} << 24;
 struct PackedUnits {
   double weight = 1.0;
   double residual = 1.0;
+  double per_weight = 1.0;    ///< 1 / weight
   double per_residual = 1.0;  ///< 1 / residual
   double most = 0.0;          ///< units of residual that a row may have; more are cut, so that no sum overflows
 };
@@ -34,7 +35,7 @@ struct PackedUnits {
 PackedUnits units_of(std::span<const double> residuals, std::span<const double> weights, bool equal_weights);
 
 inline PackedSum packed(double residual, double weight, const PackedUnits& units) {
-  const auto whole_weight = static_cast<std::int64_t>(weight / units.weight + 0.5);
+  const auto whole_weight = static_cast<std::int64_t>(weight * units.per_weight + 0.5);
   const double units_of_residual = std::clamp(residual * weight * units.per_residual, -units.most, units.most);
   const auto whole_residual = static_cast<std::int64_t>(units_of_residual + std::copysign(0.5, units_of_residual));
   return (whole_weight << residual_bits) + whole_residual;

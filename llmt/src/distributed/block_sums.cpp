@@ -33,31 +33,39 @@ void check_rows(const Rows& rows, const StateData& data) {
   if (rows.inputs.rows() != rows.output.size()) {
     refuse(fmt::format("{} rows of inputs, {} of the output", rows.inputs.rows(), rows.output.size()));
   }
+  if (rows.weights.size() != (data.is_weighted() ? rows.output.size() : 0)) {
+    refuse(fmt::format("{} weights of {} rows, and the fit has {}", rows.weights.size(), rows.output.size(),
+                       data.is_weighted() ? "weights" : "none: see Options::weighted"));
+  }
+}
+
+bool is_level(const StateData& data, double value, Eigen::Index input) {
+  return value >= 0.0 && value < static_cast<double>(data.levels[input].size()) && value == std::floor(value);
 }
 
 void check_value(const StateData& data, double value, Eigen::Index row, Eigen::Index column) {
   const bool is_output = column == data.inputs();
   const bool may_be_missing = !is_output && (data.step == Step::describe || data.rows <= data.options.branch_rows);
-  if (std::abs(value) <= largest_magnitude || (may_be_missing && std::isnan(value))) return;
-  refuse(fmt::format("row {}, column \"{}\" is {}, it must be a number of at most {:g}", row,
-                     to_string(is_output ? data.output_name : data.input_names[column]), value, largest_magnitude));
+  if (may_be_missing && std::isnan(value)) return;
+  const bool is_category = data.is_category(column);
+  if (is_category ? is_level(data, value, column) : std::abs(value) <= largest_magnitude) return;
+  refuse(fmt::format("row {}, column \"{}\" is {}, it must be {}", row,
+                     to_string(is_output ? data.output_name : data.input_names[column]), value,
+                     is_category
+                         ? fmt::format("the number of a category: there are {}, from 0 on", data.levels[column].size())
+                         : fmt::format("a number of at most {:g}", largest_magnitude)));
 }
 
-// The rows of one block.
-struct Block {
-  const Rows& rows;
-  RowSpan span;
-  Eigen::Index number;  // of the block in the table
-
-  double at(Eigen::Index row, Eigen::Index column) const {
-    return column < rows.inputs.cols() ? rows.inputs(row, column) : rows.output(row);
-  }
-};
+void check_weight(double weight, Eigen::Index row) {
+  if (weight >= 0.0 && weight <= largest_magnitude) return;
+  refuse(fmt::format("row {}: the weight is {}, it must be from 0 to {:g}", row, weight, largest_magnitude));
+}
 
 Sample sample_of(const Block& block, Eigen::Index columns) {
   std::vector<std::pair<std::uint64_t, Eigen::Index>> hashed;
   const std::uint64_t of_block = row_hash(0, static_cast<double>(block.number));
   for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
+    if (block.weight(row) == 0.0) continue;
     hashed.emplace_back(row_hash(of_block, static_cast<double>(row - block.span.begin)), row);
   }
   const std::size_t kept = std::min(Sample::most, hashed.size());
@@ -74,7 +82,14 @@ Sample sample_of(const Block& block, Eigen::Index columns) {
 
 void describe(const StateData& data, const Block& block, Description& sum) {
   const Eigen::Index columns = data.inputs() + 1;
-  sum.rows = block.span.count();
+  for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
+    const double weight = block.weight(row);
+    check_weight(weight, row);
+    if (weight == 0.0) continue;
+    ++sum.rows;
+    sum.weight += weight;
+    sum.fractional += weight == std::floor(weight) ? 0 : 1;
+  }
   sum.range.resize(columns);
   sum.total.assign(columns, 0.0);
   sum.missing.assign(data.inputs(), 0);
@@ -82,40 +97,54 @@ void describe(const StateData& data, const Block& block, Description& sum) {
     for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
       const double value = block.at(row, column);
       check_value(data, value, row, column);
+      const double weight = block.weight(row);
+      if (weight == 0.0) continue;
       if (std::isnan(value)) {
         ++sum.missing[column];
       } else {
         sum.range[column].widen(value);
-        sum.total[column] += value;
+        sum.total[column] += weight * value;
       }
     }
   }
-  sum.sample = sample_of(block, columns);
+  sum.sample = sample_of(block, data.row_columns());
 }
 
 // Scales the rows of a pass and finds their nodes.
 class Placed {
  public:
-  explicit Placed(const StateData& data) : data_(data), z_(data.inputs()) {
+  explicit Placed(const StateData& data) : data_(data), numbers_(data.numbers()), z_(std::ssize(numbers_)) {
     if (data.nodes.front().fate != Fate::inner) return;
     int rank = 0;
     root_ = model_of(data, data.nodes.front(), rank);
   }
 
-  void set(const Block& block, Eigen::Index row) {
+  /// Returns whether the row takes part.
+  bool set(const Block& block, Eigen::Index row) {
     const Eigen::Index inputs = data_.inputs();
     for (Eigen::Index j = 0; j <= inputs; ++j) check_value(data_, block.at(row, j), row, j);
-    for (Eigen::Index j = 0; j < inputs; ++j) z_(j) = (block.rows.inputs(row, j) - data_.mean(j)) / data_.scale(j);
+    check_weight(block.weight(row), row);
+    if (block.weight(row) == 0.0) return false;
+    weight_ = data_.weight_scale * block.weight(row);
+    for (Eigen::Index k = 0; k < z_.size(); ++k) {
+      const Eigen::Index j = numbers_[k];
+      z_(k) = (block.rows.inputs(row, j) - data_.mean(j)) / data_.scale(j);
+    }
     y_ = (block.rows.output(row) - data_.mean(inputs)) / data_.scale(inputs);
     node_ = 0;
     while (data_.nodes[node_].fate == Fate::inner) {
       const TopNode& node = data_.nodes[node_];
-      node_ = block.rows.inputs(row, node.input) <= node.threshold ? node.left : node.right;
+      const double value = block.rows.inputs(row, node.input);
+      const bool is_left =
+          node.level_side.empty() ? value <= node.threshold : node.level_side[static_cast<std::size_t>(value)] < 0;
+      node_ = is_left ? node.left : node.right;
     }
+    return true;
   }
 
   const Eigen::VectorXd& z() const { return z_; }
   double y() const { return y_; }
+  double weight() const { return weight_; }
   Eigen::Index node() const { return node_; }
 
   void widen(Extent& root_residual) const {
@@ -125,21 +154,24 @@ class Placed {
 
  private:
   const StateData& data_;
+  std::vector<Eigen::Index> numbers_;
   Eigen::VectorXd root_;  // the root's model, once it is known
   Eigen::VectorXd z_;
   double y_ = 0.0;
+  double weight_ = 1.0;
   Eigen::Index node_ = 0;
 };
 
-// Numbers of bins: the number of edges below a value, by bisection without branches.
+// Numbers of bins: the number of edges below a value, by bisection without branches; or a category's own number.
 class BinFinder {
  public:
-  explicit BinFinder(const std::vector<double>& edges) {
+  BinFinder(const std::vector<double>& edges, bool is_category) : is_category_(is_category) {
     padded_.fill(std::numeric_limits<double>::infinity());
     std::ranges::copy(edges, padded_.begin());
   }
 
   Eigen::Index operator()(double value) const {
+    if (is_category_) return static_cast<Eigen::Index>(value);
     std::size_t below = 0;
     for (std::size_t step = padded_.size() / 2; step > 0; step /= 2) {
       below += padded_[below + step - 1] < value ? step : 0;
@@ -148,6 +180,7 @@ class BinFinder {
   }
 
  private:
+  bool is_category_;
   std::array<double, 256> padded_{};
 };
 
@@ -156,14 +189,17 @@ void grow(const StateData& data, const Block& block, BlockSum& sum) {
   const Eigen::Index inputs = data.inputs();
   const std::vector<Eigen::Index> first = first_bins(data);
   std::vector<BinFinder> finders;
-  for (const std::vector<double>& edges : data.edges) finders.emplace_back(edges);
+  for (Eigen::Index j = 0; j < inputs; ++j) finders.emplace_back(data.edges[j], data.is_category(j));
   std::vector<NodeSums*> sums(data.nodes.size(), nullptr);
   std::vector<Basis> basis(data.nodes.size());
-  for (const Eigen::Index node : data.asked) basis[node] = {Eigen::VectorXd::Zero(inputs), data.nodes[node].base};
+  const Eigen::Index regressors = shape.coefficients() - 1;
+  for (const Eigen::Index node : data.asked) {
+    basis[node] = {Eigen::VectorXd::Zero(regressors), data.nodes[node].base};
+  }
   RowProducts products(shape);
   Placed placed(data);
   for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
-    placed.set(block, row);
+    if (!placed.set(block, row)) continue;
     placed.widen(sum.root_residual);
     const Eigen::Index node = placed.node();
     if (basis[node].base.size() == 0) continue;
@@ -173,30 +209,37 @@ void grow(const StateData& data, const Block& block, BlockSum& sum) {
       of_node->grams.assign(first.back() * shape.size(), 0.0);
       of_node->counts.assign(first.back(), 0);
       of_node->held_out.assign(shape.size(), 0.0);
-      of_node->range.resize(inputs);
+      of_node->range.resize(regressors);
     }
-    products.set(basis[node], placed.z().data(), placed.y(), 1.0);
+    products.set(basis[node], placed.z().data(), placed.y(), placed.weight());
     for (Eigen::Index j = 0; j < inputs; ++j) {
       const Eigen::Index bin = first[j] + finders[j](block.rows.inputs(row, j));
       products.add_to(of_node->grams.data() + bin * shape.size());
       ++of_node->counts[bin];
-      of_node->range[j].widen(placed.z()(j));
     }
+    for (Eigen::Index k = 0; k < regressors; ++k) of_node->range[k].widen(placed.z()(k));
     if (is_held_out(block.number)) products.add_to(of_node->held_out.data());
   }
 }
 
 void gather(const StateData& data, const Block& block, BlockSum& sum) {
-  const Eigen::Index inputs = data.inputs();
+  const Eigen::Index columns = data.row_columns();
   std::vector<std::vector<double>*> rows(data.nodes.size(), nullptr);
   Placed placed(data);
   for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
-    placed.set(block, row);
+    if (!placed.set(block, row)) continue;
     placed.widen(sum.root_residual);
     const Eigen::Index node = placed.node();
     if (!std::ranges::binary_search(data.asked, node)) continue;
     if (rows[node] == nullptr) rows[node] = &sum.branches[node].pieces.emplace_back();
-    for (Eigen::Index column = 0; column <= inputs; ++column) rows[node]->push_back(block.at(row, column));
+    for (Eigen::Index column = 0; column < columns; ++column) rows[node]->push_back(block.at(row, column));
+  }
+}
+
+void check_block(const StateData& data, const Block& block) {
+  for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
+    for (Eigen::Index j = 0; j <= data.inputs(); ++j) check_value(data, block.at(row, j), row, j);
+    check_weight(block.weight(row), row);
   }
 }
 
@@ -205,6 +248,10 @@ BlockSum sum_block(const StateData& data, const Block& block) {
   if (data.step == Step::describe) describe(data, block, sum.description);
   if (data.step == Step::grow) grow(data, block, sum);
   if (data.step == Step::gather) gather(data, block, sum);
+  if (data.step == Step::blend) {
+    check_block(data, block);
+    add_joint(data, block, sum.joint);
+  }
   return sum;
 }
 
@@ -251,6 +298,9 @@ Sums sums(const Rows& rows, const State& state, int max_threads) {
   result->mark = data.mark;
   result->step = data.step;
   result->inputs = data.inputs();
+  result->regressors = data.shape().coefficients() - 1;
+  result->columns = data.row_columns();
+  result->unknowns = data.step == Step::blend ? unknowns_of(data) : 0;
   result->bins = data.step == Step::describe ? 0 : first_bins(data).back();
   const RowBlocks blocks{rows.output.size(), data.options.block_rows};
   if (blocks.count() == 0) return Sums(std::move(result));

@@ -10,31 +10,50 @@
 #include <vector>
 
 #include "base/sum_over.hpp"
+#include "distributed/sample_tree.hpp"
 #include "distributed/state.hpp"
 #include "llmt/distributed.hpp"
 
 namespace llmt::distributed {
+
+/// The rows of one block.
+struct Block {
+  const Rows& rows;
+  RowSpan span;
+  Eigen::Index number;  // of the block in the table
+
+  double at(Eigen::Index row, Eigen::Index column) const {
+    if (column < rows.inputs.cols()) return rows.inputs(row, column);
+    return column == rows.inputs.cols() ? rows.output(row) : rows.weights(row);
+  }
+
+  double weight(Eigen::Index row) const { return rows.weights.size() == 0 ? 1.0 : rows.weights(row); }
+};
 
 /// The rows with the smallest hashes of their block and place in it: a sample that is the same however sums are merged.
 struct Sample {
   static constexpr std::size_t most = 16384;
 
   std::vector<std::uint64_t> hashes;  ///< ascending
-  std::vector<double> values;         ///< one row after the other: inputs, output
+  std::vector<double> values;         ///< one row after the other: inputs, output, weight if there is one
 
   Sample& operator+=(const Sample& other);
   static auto fields(auto& self) { return std::tie(self.hashes, self.values); }
 };
 
-/// What describes the columns.
+/// What describes the columns, over the rows whose weight is not 0.
 struct Description {
   Eigen::Index rows = 0;
+  double weight = 0.0;
+  Eigen::Index fractional = 0;        ///< rows whose weight is no whole number
   std::vector<Extent> range;          ///< inputs, output
-  std::vector<double> total;          ///< of the values that are not missing
+  std::vector<double> total;          ///< of the values that are not missing, times their weights
   std::vector<Eigen::Index> missing;  ///< of every input
   Sample sample;
 
-  static auto fields(auto& self) { return std::tie(self.rows, self.range, self.total, self.missing, self.sample); }
+  static auto fields(auto& self) {
+    return std::tie(self.rows, self.weight, self.fractional, self.range, self.total, self.missing, self.sample);
+  }
 };
 
 /// Sums over the rows of a node that is to be split, in the layout of GramShape.
@@ -42,12 +61,13 @@ struct NodeSums {
   std::vector<double> grams;         ///< inputs x bins, one input after the other
   std::vector<Eigen::Index> counts;  ///< rows of every bin
   std::vector<double> held_out;      ///< Gram matrix of the rows in held-out blocks
-  std::vector<Extent> range;         ///< of every scaled input
+  std::vector<Extent> range;         ///< of every regressor
 
   static auto fields(auto& self) { return std::tie(self.grams, self.counts, self.held_out, self.range); }
 };
 
-/// Rows of a branch: inputs, output, one row after the other; in pieces, so that sums are merged without copies.
+/// Rows of a branch: inputs, output, weight if there is one; one row after the other; in pieces, so that sums are
+/// merged without copies.
 struct BranchRows {
   std::vector<std::vector<double>> pieces;
 
@@ -61,8 +81,11 @@ struct BlockSum {
   Extent root_residual;
   std::map<Eigen::Index, NodeSums> nodes;
   std::map<Eigen::Index, BranchRows> branches;
+  JointSums joint;
 
-  static auto fields(auto& self) { return std::tie(self.description, self.root_residual, self.nodes, self.branches); }
+  static auto fields(auto& self) {
+    return std::tie(self.description, self.root_residual, self.nodes, self.branches, self.joint);
+  }
 };
 
 /// Sums over blocks that follow each other.
@@ -78,17 +101,25 @@ struct SumsData {
   std::uint64_t mark = 0;  ///< of the state that asked
   Step step = Step::describe;
   Eigen::Index inputs = 0;
-  Eigen::Index bins = 0;  ///< of all inputs together
-  std::vector<Run> runs;  ///< ascending, with gaps between them
+  Eigen::Index regressors = 0;  ///< inputs that are numbers
+  Eigen::Index columns = 0;     ///< StateData::row_columns()
+  Eigen::Index bins = 0;        ///< of all inputs together
+  Eigen::Index unknowns = 0;    ///< of the sample's tree
+  std::vector<Run> runs;        ///< ascending, with gaps between them
 
-  static auto fields(auto& self) { return std::tie(self.mark, self.step, self.inputs, self.bins, self.runs); }
+  static auto fields(auto& self) {
+    return std::tie(self.mark, self.step, self.inputs, self.regressors, self.columns, self.bins, self.unknowns,
+                    self.runs);
+  }
 };
 
 /// Throws std::runtime_error if sizes or numbers of blocks do not go together.
 void check_sums(const SumsData& data);
 
-/// Bins of an input: one more than edges.
-inline Eigen::Index bins_of(const StateData& data, Eigen::Index input) { return std::ssize(data.edges[input]) + 1; }
+/// Bins of an input: one more than edges, or the levels of a category.
+inline Eigen::Index bins_of(const StateData& data, Eigen::Index input) {
+  return data.is_category(input) ? std::ssize(data.levels[input]) : std::ssize(data.edges[input]) + 1;
+}
 
 /// Where an input's bins begin among those of a node; of the number of inputs: the number of bins.
 std::vector<Eigen::Index> first_bins(const StateData& data);

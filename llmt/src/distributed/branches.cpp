@@ -1,4 +1,4 @@
-// Branches that fit() finishes, and the model of top and branches.
+// Branches that fit() finishes, and the choice of the size of the top.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,8 +8,7 @@
 #include <stdexcept>
 
 #include "distributed/growth.hpp"
-#include "estimation/estimate.hpp"
-#include "estimation/leaf_statistics.hpp"
+#include "distributed/top_model.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/intervals.hpp"
 #include "numerics/gram.hpp"
@@ -18,26 +17,26 @@
 namespace llmt::distributed {
 namespace {
 
-std::vector<std::string> names_of(const std::vector<Text>& texts) {
-  std::vector<std::string> names;
-  for (const Text& text : texts) names.push_back(to_string(text));
-  return names;
-}
-
 // The rows of a branch as fit() takes them. Pieces are freed on the way.
 TrainingData data_of(const StateData& data, const TopNode& node, BranchRows rows) {
   TrainingData result;
   const Eigen::Index inputs = data.inputs();
+  const Eigen::Index columns = data.row_columns();
+  const bool is_all = node.rows == data.rows;
   result.inputs.resize(node.rows, inputs);
   result.outputs.resize(node.rows, 1);
+  if (data.is_weighted()) result.weights.resize(node.rows);
   Eigen::Index next = 0;
   for (std::vector<double>& piece : rows.pieces) {
-    const Eigen::Index count = std::ssize(piece) / (inputs + 1);
+    const Eigen::Index count = std::ssize(piece) / columns;
     if (count > node.rows - next) break;
     using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const Eigen::Map<const RowMajorMatrix> values(piece.data(), count, inputs + 1);
+    const Eigen::Map<const RowMajorMatrix> values(piece.data(), count, columns);
     result.inputs.middleRows(next, count) = values.leftCols(inputs);
-    result.outputs.middleRows(next, count) = values.rightCols(1);
+    result.outputs.middleRows(next, count) = values.col(inputs);
+    if (data.is_weighted()) {
+      result.weights.segment(next, count) = (is_all ? 1.0 : data.weight_scale) * values.col(inputs + 1);
+    }
     next += count;
     std::vector<double>().swap(piece);
   }
@@ -45,81 +44,10 @@ TrainingData data_of(const StateData& data, const TopNode& node, BranchRows rows
     throw std::runtime_error(fmt::format(
         "llmt::distributed::advance: a branch has not the {} rows that it had: the table changed", node.rows));
   }
-  result.input_names = names_of(data.input_names);
+  result.input_names = to_strings(data.input_names);
   result.output_names = {to_string(data.output_name)};
+  for (const std::vector<Text>& levels : data.levels) result.levels.push_back(to_strings(levels));
   return result;
-}
-
-// A node of the top with the local model of its sums.
-Node node_of_sums(const StateData& data, const TopNode& from) {
-  const Eigen::Index inputs = data.inputs();
-  const GramShape shape = data.shape();
-  const Eigen::VectorXd scale = data.scale.head(inputs);
-  const double unit = data.scale(inputs);
-  Node node;
-  const Eigen::VectorXd model = model_of(data, from, node.rank);
-  const Eigen::VectorXd change = model - from.base;
-  node.samples = from.rows;
-  node.rss = Eigen::VectorXd::Constant(1, unit * unit * remaining(shape, from.gram.data(), change));
-  node.value = Eigen::VectorXd::Constant(1, data.mean(inputs) + unit * model(0));
-  node.slope = (unit * model.tail(inputs).cwiseQuotient(scale)).transpose();
-  node.mean.resize(inputs);
-  for (Eigen::Index k = 0; k < inputs; ++k) {
-    node.mean(k) = scale(k) * std::clamp(from.gram[shape.at(k + 1, 0)] / from.gram[0], from.low(k), from.high(k));
-  }
-  node.low = scale.cwiseProduct(from.low);
-  node.high = scale.cwiseProduct(from.high);
-  if (from.fate == Fate::inner) {
-    node.split_input = static_cast<int>(from.input);
-    node.threshold = from.threshold;
-  } else {
-    const Eigen::MatrixXd gram = matrix_of(shape, from.gram.data()).topLeftCorner(inputs + 1, inputs + 1);
-    // A regressor that does not vary is 0 in all rows.
-    const Eigen::VectorXd roots = (gram.diagonal().array() > 0.0).select(gram.diagonal(), gram(0, 0)).cwiseSqrt();
-    Eigen::VectorXd units(inputs + 1);
-    units << 1.0, scale.cwiseInverse();
-    node.inverse_gram = units.asDiagonal() * inverse_gram(gram, roots) * units.asDiagonal();
-  }
-  return node;
-}
-
-// The nodes of a branch's model about the means of the whole table: deviations of the branch are those of the table
-// plus `shift`.
-void append_branch(const StateData& data, const Model& model, std::size_t root, std::vector<Node>& nodes) {
-  const Eigen::Index inputs = data.inputs();
-  const std::vector<Regressor>& regressors = model.regressors();
-  const Eigen::Index own = std::ssize(regressors);
-  const int offset = static_cast<int>(nodes.size()) - 1;  // node k > 0 of the branch becomes k + offset
-  const std::vector<Node>& branch = model.partitions().front().nodes;
-  for (std::size_t k = 0; k < branch.size(); ++k) {
-    Node node = branch[k];
-    const Node from = node;
-    node.slope = Eigen::MatrixXd::Zero(1, inputs);
-    node.mean = node.low = node.high = Eigen::VectorXd::Zero(inputs);
-    Eigen::MatrixXd change = Eigen::MatrixXd::Zero(own + 1, inputs + 1);  // [1, deviations] of the branch
-    change(0, 0) = 1.0;
-    for (Eigen::Index r = 0; r < own; ++r) {
-      const int input = regressors[r].input;
-      const double shift = regressors[r].centre - data.mean(input);
-      node.value(0) -= from.slope(0, r) * shift;
-      node.slope(0, input) = from.slope(0, r);
-      node.mean(input) = from.mean(r) + shift;
-      node.low(input) = from.low(r) + shift;
-      node.high(input) = from.high(r) + shift;
-      change(r + 1, 0) = -shift;
-      change(r + 1, input + 1) = 1.0;
-    }
-    if (from.inverse_gram.size() > 0) node.inverse_gram = change.transpose() * from.inverse_gram * change;
-    if (!node.is_leaf()) {
-      node.left += offset;
-      node.right += offset;
-    }
-    if (k == 0) {
-      nodes[root] = std::move(node);
-    } else {
-      nodes.push_back(std::move(node));
-    }
-  }
 }
 
 // Mean square of the residuals of a node's own model on the rows of held-out blocks, when it is made of the others;
@@ -148,9 +76,7 @@ void prune(StateData& data) {
     }
     square[at] = held_out_square(data, node);
     if (node.fate == Fate::inner) {
-      const auto weighted = [&](Eigen::Index child) {
-        return static_cast<double>(data.nodes[child].rows) * square[child] / static_cast<double>(node.rows);
-      };
+      const auto weighted = [&](Eigen::Index child) { return data.nodes[child].weight * square[child] / node.weight; };
       const double below = weighted(node.left) + weighted(node.right);
       if (square[at] <= below) {
         node.fate = Fate::leaf;
@@ -176,48 +102,6 @@ void keep_reachable(StateData& data) {
     kept.push_back(std::move(second));
   }
   data.nodes = std::move(kept);
-}
-
-Model assemble(const StateData& data) {
-  const Eigen::Index inputs = data.inputs();
-  std::vector<InputColumn> columns;
-  std::vector<Regressor> regressors;
-  for (Eigen::Index j = 0; j < inputs; ++j) {
-    columns.push_back({.name = to_string(data.input_names[j]),
-                       .low = data.range[j].low,
-                       .high = data.range[j].high,
-                       .centre = data.mean(j)});
-    regressors.push_back({.input = static_cast<int>(j), .centre = data.mean(j)});
-  }
-  Partition partition;
-  partition.outputs = {0};
-  partition.nodes.resize(data.nodes.size());
-  for (std::size_t at = 0; at < data.nodes.size(); ++at) {
-    const TopNode& from = data.nodes[at];
-    if (from.fate == Fate::done) {
-      const Model branch = from_json(to_string(from.branch), "a branch");
-      const Validity validity = branch.partitions().front().validity;
-      if (validity.kind != ValidityKind::crisp) {
-        partition.validity = {validity.kind, std::max(partition.validity.width, validity.width)};
-      }
-      append_branch(data, branch, at, partition.nodes);
-      continue;
-    }
-    partition.nodes[at] = node_of_sums(data, from);
-    if (from.fate == Fate::inner) {
-      partition.nodes[at].left = static_cast<int>(from.left);
-      partition.nodes[at].right = static_cast<int>(from.right);
-      const double rows = static_cast<double>(data.nodes[from.left].rows);
-      partition.nodes[at].missing_left = rows / static_cast<double>(from.rows);
-    }
-  }
-  partition.outer_slope = agreed_slope(partition);
-  if (data.root_residual.low <= data.root_residual.high) {
-    partition.residual_range = Eigen::RowVector2d(data.root_residual.low, data.root_residual.high);
-  }
-  const Extent& range = data.range[inputs];
-  return Model(std::move(columns), {{to_string(data.output_name), range.low, range.high}}, std::move(regressors),
-               {std::move(partition)});
 }
 
 }  // namespace
@@ -276,13 +160,25 @@ State advance(const State& state, Sums sums, const Progress& progress, int max_t
   data.blocks = next;
   ++data.passes;
   // Before the root's model is known, its residuals have no range.
-  const bool has_root_model = data.step != Step::describe && data.nodes.front().fate == Fate::inner;
+  const bool has_root_model =
+      data.step != Step::describe && data.step != Step::blend && data.nodes.front().fate == Fate::inner;
   if (has_root_model) data.root_residual = total.root_residual;
-  if (data.step == Step::describe) take_description(data, std::move(total.description));
+  if (data.step == Step::describe) {
+    take_description(data, total.description);
+    if (data.rows > data.options.branch_rows) take_sample(data, total.description.sample, progress, max_threads);
+  }
   if (data.step == Step::grow) take_nodes(data, std::move(total.nodes));
   if (data.step == Step::gather) take_branches(data, std::move(total.branches), progress, max_threads);
+  if (data.step == Step::blend) {
+    take_joint(data, std::move(total.joint));
+    data.step = Step::finished;
+    return finish_state(std::move(data));
+  }
   ask(data);
-  if (data.step == Step::finished) finish(data);
+  if (data.step == Step::finished) {
+    finish(data);
+    if (!data.sample_model.empty()) data.step = Step::blend;
+  }
   return finish_state(std::move(data));
 }
 

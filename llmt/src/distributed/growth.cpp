@@ -9,7 +9,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "growth/search/adjusted_rss.hpp"
+#include "distributed/top_split.hpp"
 #include "stream/sums.hpp"
 
 namespace llmt::distributed {
@@ -21,20 +21,29 @@ constexpr std::size_t most_bins = 64;
 // The bins of the nodes of a pass take at most this many doubles, 32 MiB, or those of one node.
 constexpr Eigen::Index largest_sums = Eigen::Index{1} << 22;
 
-// A child has at least this part of the rows wherever there is such a split, so that few passes reach branches.
-constexpr Eigen::Index smallest_part = 8;
+// A value of the sample, and the weight of its row.
+struct Weighted {
+  double value;
+  double weight;
+};
 
-// At most most_bins - 1 thresholds that each lie between two neighbouring values of the sample.
-std::vector<double> edges_of(std::vector<double> values) {
-  std::ranges::sort(values);
+// At most most_bins - 1 thresholds that each lie between two neighbouring values of the sample: at its quantiles.
+std::vector<double> edges_of(std::vector<Weighted> values) {
+  std::ranges::sort(values, {}, &Weighted::value);
   const auto between = [](double low, double high) {
     return std::min(low + 0.5 * (high - low), std::nextafter(high, low));
   };
+  double all = 0.0;
+  for (const Weighted& each : values) all += each.weight;
   std::vector<double> edges;
+  double before = 0.0;
+  std::size_t at = 0;
   for (std::size_t bin = 1; bin < most_bins; ++bin) {
-    const auto next = std::ranges::upper_bound(values, values[bin * values.size() / most_bins]);
+    const double wanted = std::floor(static_cast<double>(bin) * all / static_cast<double>(most_bins));
+    while (at + 1 < values.size() && before + values[at].weight <= wanted) before += values[at++].weight;
+    const auto next = std::ranges::upper_bound(values, values[at].value, {}, &Weighted::value);
     if (next == values.end() || next == values.begin()) continue;
-    const double edge = between(*std::prev(next), *next);
+    const double edge = between(std::prev(next)->value, next->value);
     if (edges.empty() || edges.back() < edge) edges.push_back(edge);
   }
   return edges;
@@ -42,98 +51,49 @@ std::vector<double> edges_of(std::vector<double> values) {
 
 // The least-squares model of the sample, near which the root's model lies.
 Eigen::VectorXd model_of_sample(const StateData& data, const Sample& sample) {
-  const Eigen::Index inputs = data.inputs();
+  const std::vector<Eigen::Index> numbers = data.numbers();
+  const Eigen::Index count = std::ssize(numbers);
+  const Eigen::Index columns = data.row_columns();
   RowProducts products(data.shape());
-  const Basis basis{Eigen::VectorXd::Zero(inputs), Eigen::VectorXd::Zero(inputs + 1)};
+  const Basis basis{Eigen::VectorXd::Zero(count), Eigen::VectorXd::Zero(count + 1)};
   std::vector<double> gram(data.shape().size(), 0.0);
+  Eigen::VectorXd z(count);
   for (std::size_t row = 0; row < sample.hashes.size(); ++row) {
-    const Eigen::Map<const Eigen::VectorXd> values(sample.values.data() + row * (inputs + 1), inputs + 1);
-    const Eigen::VectorXd scaled = (values - data.mean).cwiseQuotient(data.scale);
-    products.set(basis, scaled.data(), scaled(inputs), 1.0);
+    const double* const values = sample.values.data() + row * columns;
+    const auto scaled = [&](Eigen::Index column) { return (values[column] - data.mean(column)) / data.scale(column); };
+    for (Eigen::Index k = 0; k < count; ++k) z(k) = scaled(numbers[k]);
+    const double weight = data.is_weighted() ? data.weight_scale * values[columns - 1] : 1.0;
+    products.set(basis, z.data(), scaled(data.inputs()), weight);
     products.add_to(gram.data());
   }
   int rank = 0;
   return solve(data.shape(), gram.data(), 0.0, rank);
 }
 
-double standard_deviation(const std::vector<double>& values) {
-  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+double standard_deviation(const std::vector<Weighted>& values) {
+  double weight = 0.0;
+  double sum = 0.0;
+  for (const Weighted& each : values) {
+    weight += each.weight;
+    sum += each.weight * each.value;
+  }
+  const double mean = sum / weight;
   double squares = 0.0;
-  for (const double value : values) squares += (value - mean) * (value - mean);
-  return std::sqrt(squares / static_cast<double>(values.size()));
+  for (const Weighted& each : values) squares += each.weight * (each.value - mean) * (each.value - mean);
+  return std::sqrt(squares / weight);
 }
 
-// A split at an edge between two bins.
-struct TopSplit {
-  Eigen::Index input = -1;
-  Eigen::Index edge = 0;
-  Eigen::Index left = 0;  // rows
-  double adjusted = std::numeric_limits<double>::infinity();
-};
-
-// The sums of a node's rows on one side of every edge of an input.
-std::vector<double> sums_of_side(const GramShape& shape, const double* grams, Eigen::Index bins, bool from_left) {
-  std::vector<double> sides((bins - 1) * shape.size(), 0.0);
-  for (Eigen::Index step = 0; step + 1 < bins; ++step) {
-    const Eigen::Index edge = from_left ? step : bins - 2 - step;
-    double* const side = sides.data() + edge * shape.size();
-    const double* const nearer = from_left ? side - shape.size() : side + shape.size();
-    if (step > 0) std::copy(nearer, nearer + shape.size(), side);
-    add(shape, grams + (from_left ? edge : edge + 1) * shape.size(), side);
-  }
-  return sides;
-}
-
-struct Sides {
-  std::vector<double> rss;
-  std::vector<int> rank;
-};
-
-Sides evaluate(const GramShape& shape, const std::vector<double>& grams) {
-  std::vector<const double*> each;
-  for (std::size_t at = 0; at < grams.size(); at += shape.size()) each.push_back(grams.data() + at);
-  Sides sides{std::vector<double>(each.size()), std::vector<int>(each.size())};
-  ResidualSums(shape, Eigen::VectorXd::Ones(1))
-      .evaluate(each.data(), std::ssize(each), sides.rss.data(), sides.rank.data());
-  return sides;
-}
-
-// The edge with the smallest adjusted RSS (G.7) among those that leave `least` rows on either side.
-TopSplit best_edge(const StateData& data, const NodeSums& sums, const AdjustedRss& scale, Eigen::Index rows,
-                   Eigen::Index least) {
-  const GramShape shape = data.shape();
+// The weights of the levels of every category, from the bins of the root.
+std::vector<std::vector<double>> level_weights(const StateData& data, const NodeSums& sums) {
   const std::vector<Eigen::Index> first = first_bins(data);
-  TopSplit best;
+  std::vector<std::vector<double>> weights(data.inputs());
   for (Eigen::Index j = 0; j < data.inputs(); ++j) {
-    const Eigen::Index bins = bins_of(data, j);
-    if (bins < 2) continue;
-    const double* const grams = sums.grams.data() + first[j] * shape.size();
-    const Sides left = evaluate(shape, sums_of_side(shape, grams, bins, true));
-    const Sides right = evaluate(shape, sums_of_side(shape, grams, bins, false));
-    Eigen::Index before = 0;
-    for (Eigen::Index edge = 0; edge + 1 < bins; ++edge) {
-      before += sums.counts[first[j] + edge];
-      if (std::min(before, rows - before) < least) continue;
-      const int ranks = scale.counted(left.rank[edge], before) + scale.counted(right.rank[edge], rows - before);
-      const double adjusted = scale.of(left.rss[edge] + right.rss[edge], ranks);
-      if (adjusted < best.adjusted) best = {j, edge, before, adjusted};
+    if (!data.is_category(j)) continue;
+    for (Eigen::Index bin = first[j]; bin < first[j + 1]; ++bin) {
+      weights[j].push_back(sums.grams[bin * data.shape().size()]);
     }
   }
-  return best;
-}
-
-// The rows of the smaller child of the most even split.
-Eigen::Index most_even(const StateData& data, const NodeSums& sums, Eigen::Index rows) {
-  const std::vector<Eigen::Index> first = first_bins(data);
-  Eigen::Index most = 0;
-  for (Eigen::Index j = 0; j < data.inputs(); ++j) {
-    Eigen::Index before = 0;
-    for (Eigen::Index bin = first[j]; bin + 1 < first[j + 1]; ++bin) {
-      before += sums.counts[bin];
-      most = std::max(most, std::min(before, rows - before));
-    }
-  }
-  return most;
+  return weights;
 }
 
 Fate fate_of(const StateData& data, Eigen::Index rows) {
@@ -155,56 +115,77 @@ void take_node(StateData& data, Eigen::Index at, NodeSums sums) {
         "llmt::distributed::advance: a node has {} rows, and had {}: the table changed", counted, node.rows));
   }
   node.held_out = std::move(sums.held_out);
-  node.low.resize(data.inputs());
-  node.high.resize(data.inputs());
-  for (Eigen::Index j = 0; j < data.inputs(); ++j) {
-    node.low(j) = sums.range[j].low;
-    node.high(j) = sums.range[j].high;
+  node.low.resize(std::ssize(sums.range));
+  node.high.resize(std::ssize(sums.range));
+  for (Eigen::Index k = 0; k < std::ssize(sums.range); ++k) {
+    node.low(k) = sums.range[k].low;
+    node.high(k) = sums.range[k].high;
   }
-  const Sides own = evaluate(shape, node.gram);
-  const AdjustedRss scale(static_cast<double>(node.rows), own.rank[0], own.rss[0]);
-  const Eigen::Index least = std::min(node.rows / smallest_part, most_even(data, sums, node.rows));
-  const TopSplit split = least >= scale.enough_rows() ? best_edge(data, sums, scale, node.rows, least) : TopSplit{};
+  if (at == 0) data.level_weight = level_weights(data, sums);
+  int rank = 0;
+  const Eigen::VectorXd change = solve(shape, node.gram.data(), 0.0, rank);
+  TopSplit split = best_split(data, sums, node, change, rank);
   node.fate = split.input < 0 ? Fate::leaf : Fate::inner;
   if (node.fate == Fate::inner) {
-    int rank = 0;
-    const Eigen::VectorXd model = model_of(data, node, rank);
     node.input = split.input;
-    node.threshold = data.edges[split.input][split.edge];
+    node.level_side = std::move(split.level_side);
+    node.threshold = data.is_category(split.input) ? 0.0 : data.edges[split.input][split.edge];
     node.left = std::ssize(data.nodes);
     node.right = node.left + 1;
-    for (const Eigen::Index rows : {split.left, node.rows - split.left}) {
+    for (const bool is_left : {true, false}) {
       TopNode child;
-      child.rows = rows;
-      child.fate = fate_of(data, rows);
-      child.base = model;
+      child.rows = is_left ? split.left_rows : node.rows - split.left_rows;
+      child.weight = is_left ? split.left_weight : node.weight - split.left_weight;
+      child.fate = fate_of(data, child.rows);
+      child.base = node.base + change;
       data.nodes.push_back(std::move(child));
     }
   }
   data.nodes[at] = std::move(node);
 }
 
+void refuse_missing(const StateData& data, const Description& description) {
+  for (Eigen::Index j = 0; j < data.inputs(); ++j) {
+    if (description.missing[j] == 0) continue;
+    throw std::runtime_error(fmt::format(
+        "llmt::distributed::advance: input \"{}\" has {} missing values, which is not possible beyond one memory "
+        "({} rows, branch_rows is {}); leave the column or these rows out, or fill them",
+        to_string(data.input_names[j]), description.missing[j], data.rows, data.options.branch_rows));
+  }
+}
+
+// Whether weights are counts, as TrainingData::weights has it; others are scaled to mean 1.
+void take_weights(StateData& data, const Description& description) {
+  constexpr double largest_mean_count = 10.0;
+  const auto rows = static_cast<double>(data.rows);
+  const bool are_counts = description.fractional == 0 && description.weight <= largest_mean_count * rows;
+  data.weight_scale = are_counts ? 1.0 : rows / description.weight;
+  data.weight = are_counts ? description.weight : rows;
+}
+
 }  // namespace
 
 void take_description(StateData& data, Description description) {
   data.rows = description.rows;
-  if (data.rows == 0) throw std::runtime_error("llmt::distributed::advance: there are no rows");
+  if (data.rows == 0) {
+    throw std::runtime_error(fmt::format("llmt::distributed::advance: there are no rows{}",
+                                         data.is_weighted() ? " with a weight above 0" : ""));
+  }
   const Eigen::Index columns = data.inputs() + 1;
+  take_weights(data, description);
   data.range = std::move(description.range);
-  data.mean = Eigen::Map<const Eigen::VectorXd>(description.total.data(), columns) / static_cast<double>(data.rows);
+  data.mean = Eigen::Map<const Eigen::VectorXd>(description.total.data(), columns) / description.weight;
   data.scale = Eigen::VectorXd::Ones(columns);
   data.edges.resize(data.inputs());
   const bool is_small = data.rows <= data.options.branch_rows;
+  if (!is_small) refuse_missing(data, description);
+  const Eigen::Index stored = data.row_columns();
   for (Eigen::Index j = 0; j < columns && !is_small; ++j) {
-    if (j < data.inputs() && description.missing[j] > 0) {
-      throw std::runtime_error(fmt::format(
-          "llmt::distributed::advance: input \"{}\" has {} missing values, which is not possible beyond one memory "
-          "({} rows, branch_rows is {}); leave the column or these rows out, or fill them",
-          to_string(data.input_names[j]), description.missing[j], data.rows, data.options.branch_rows));
-    }
-    std::vector<double> values;
-    for (std::size_t at = j; at < description.sample.values.size(); at += columns) {
-      values.push_back(description.sample.values[at]);
+    if (data.is_category(j)) continue;
+    std::vector<Weighted> values;
+    for (std::size_t row = 0; row < description.sample.hashes.size(); ++row) {
+      const double* const of_row = description.sample.values.data() + row * stored;
+      values.push_back({of_row[j], data.is_weighted() ? data.weight_scale * of_row[stored - 1] : 1.0});
     }
     const double deviation = standard_deviation(values);
     if (std::isnormal(deviation)) data.scale(j) = deviation;
@@ -215,8 +196,10 @@ void take_description(StateData& data, Description description) {
   }
   TopNode root;
   root.rows = data.rows;
+  root.weight = data.weight;
   root.fate = fate_of(data, data.rows);
-  root.base = is_small ? Eigen::VectorXd(Eigen::VectorXd::Zero(columns)) : model_of_sample(data, description.sample);
+  root.base =
+      is_small ? Eigen::VectorXd::Zero(data.shape().coefficients()).eval() : model_of_sample(data, description.sample);
   data.nodes.push_back(std::move(root));
 }
 

@@ -8,13 +8,14 @@
 #include <set>
 #include <stdexcept>
 
+#include "distributed/sample_tree.hpp"
 #include "llmt/intervals.hpp"
 
 namespace llmt::distributed {
 namespace {
 
 constexpr std::string_view format = "LLMTSUMS";
-constexpr std::uint32_t version = 1;
+constexpr std::uint32_t version = 2;
 
 struct Header {
   char format[8];
@@ -48,18 +49,24 @@ void check_node(const StateData& data, Eigen::Index at) {
   const TopNode& node = data.nodes[at];
   const Eigen::Index inputs = data.inputs();
   const Eigen::Index size = data.shape().size();
+  const Eigen::Index coefficients = data.shape().coefficients();
   require(node.fate >= Fate::open && node.fate <= Fate::done, "what becomes of a node");
   require(node.rows >= 0 && node.rows <= data.rows, "the number of rows of a node");
-  require(node.base.size() == inputs + 1 && finite(node.base), "the model of a node");
+  require(std::isfinite(node.weight) && node.weight >= 0.0, "the weight of a node");
+  require(node.base.size() == coefficients && finite(node.base), "the model of a node");
   const bool known = node.fate == Fate::inner || node.fate == Fate::leaf;
-  require(!known || (std::ssize(node.gram) == size && std::ssize(node.held_out) == size && node.low.size() == inputs &&
-                     node.high.size() == inputs && finite(node.low) && finite(node.high)),
+  require(!known || (std::ssize(node.gram) == size && std::ssize(node.held_out) == size &&
+                     node.low.size() == coefficients - 1 && node.high.size() == coefficients - 1 && finite(node.low) &&
+                     finite(node.high)),
           "the sums of a node");
   if (node.fate != Fate::inner) return;
   const Eigen::Index nodes = std::ssize(data.nodes);
   require(node.left > at && node.right == node.left + 1 && node.right < nodes && node.left % 2 == 1,
           "a child of a node");
-  require(node.input >= 0 && node.input < inputs && std::isfinite(node.threshold), "the split of a node");
+  require(node.input >= 0 && node.input < inputs && std::isfinite(node.threshold) &&
+              node.level_side.size() == data.levels[node.input].size() &&
+              std::ranges::all_of(node.level_side, [](Eigen::Index side) { return side >= -1 && side <= 1; }),
+          "the split of a node");
 }
 
 void check_nodes(const StateData& data) {
@@ -80,7 +87,20 @@ void check_nodes(const StateData& data) {
                 data.nodes[node].fate == expected,
             "a node that is asked for");
   }
-  require((data.step == Step::finished) == data.asked.empty(), "the list of nodes that are asked for");
+  require((data.step >= Step::blend) == data.asked.empty(), "the list of nodes that are asked for");
+  require(data.step != Step::blend || !data.sample_model.empty(), "the tree of the sample");
+}
+
+// The models of the pass that fits the tree of the sample.
+void check_sample(const StateData& data) {
+  const Model& sample = *data.sample;
+  const auto is_product = [](const Regressor& each) { return each.second_input >= 0; };
+  const auto is_of_inputs = [&](const Model& model) {
+    return data.inputs() == std::ssize(model.inputs()) && model.outputs().size() == 1 && model.partitions().size() == 1;
+  };
+  require(is_of_inputs(sample) && is_of_inputs(*data.result) && unknowns_of(data) <= most_unknowns &&
+              std::ranges::none_of(sample.regressors(), is_product),
+          "the tree of the sample");
 }
 
 void check_option(Eigen::Index value, Eigen::Index last) { require(value >= 0 && value <= last, "an option"); }
@@ -97,11 +117,15 @@ void check_state(const StateData& data) {
   check_option(options.folds, std::numeric_limits<int>::max());
   check_option(options.fold_kind, static_cast<Eigen::Index>(FoldKind::contiguous));
   check_option(options.intervals, 1);
+  check_option(options.weighted, 1);
   const Eigen::Index inputs = data.inputs();
-  require(inputs > 0, "the number of inputs");
+  require(inputs > 0 && std::ssize(data.levels) == inputs, "the number of inputs");
+  for (const std::vector<Text>& levels : data.levels) require(levels.size() <= most_levels, "the number of levels");
   require(data.step >= Step::describe && data.step <= Step::finished, "the next step");
   if (data.step == Step::describe) return require(data.nodes.empty() && data.rows == 0, "a node before the first pass");
-  require(data.rows > 0 && data.blocks > 0 && data.blocks <= data.rows, "the number of rows");
+  require(data.rows > 0 && data.blocks > 0 && std::isfinite(data.weight) && data.weight > 0.0 &&
+              std::isfinite(data.weight_scale) && data.weight_scale > 0.0,
+          "the number of rows");
   require(std::ssize(data.range) == inputs + 1 && data.mean.size() == inputs + 1 && data.scale.size() == inputs + 1 &&
               std::ssize(data.edges) == inputs && finite(data.mean) && finite(data.scale) &&
               (data.scale.array() > 0.0).all(),
@@ -110,6 +134,21 @@ void check_state(const StateData& data) {
     require(std::ssize(edges) < 256 && std::ranges::is_sorted(edges, std::less_equal<>()), "the edges of bins");
   }
   check_nodes(data);
+  const bool has_root_sums = !data.nodes.front().gram.empty();
+  require(data.level_weight.size() == (has_root_sums ? data.levels.size() : 0), "the weights of the levels");
+  for (std::size_t j = 0; j < data.level_weight.size(); ++j) {
+    require(data.level_weight[j].size() == data.levels[j].size() &&
+                std::ranges::all_of(data.level_weight[j], [](double weight) { return std::isfinite(weight); }),
+            "the weights of the levels");
+  }
+}
+
+std::vector<Eigen::Index> StateData::numbers() const {
+  std::vector<Eigen::Index> numbers;
+  for (Eigen::Index j = 0; j < inputs(); ++j) {
+    if (levels[j].empty()) numbers.push_back(j);
+  }
+  return numbers;
 }
 
 std::string sealed(char kind, const std::string& content) {
@@ -140,75 +179,14 @@ std::string_view unsealed(char kind, std::string_view bytes, const std::string& 
   return bytes;
 }
 
-FitOptions branch_options(const KeptOptions& kept, int max_threads) {
-  FitOptions options;
-  options.max_leaves = kept.max_leaves;
-  options.min_leaf_samples = kept.min_leaf_samples;
-  options.significance = kept.significance;
-  options.pruning = static_cast<Pruning>(kept.pruning);
-  options.validity = static_cast<ValidityChoice>(kept.validity);
-  options.sparse = static_cast<SparseChoice>(kept.sparse);
-  options.folds = {static_cast<int>(kept.folds), static_cast<FoldKind>(kept.fold_kind), kept.seed};
-  options.intervals = kept.intervals != 0;
-  options.max_threads = max_threads;
-  options.expert.estimation = static_cast<Estimation>(kept.estimation);
-  options.expert.widths = kept.widths;
-  options.expert.jumps = kept.jumps;
-  options.expert.ridges = kept.ridges;
-  options.expert.shrinkages = kept.shrinkages;
-  return options;
-}
-
-KeptOptions kept_options(const Options& options) {
-  const FitOptions& fit = options.fit;
-  const auto refuse = [](bool asked, const char* option, const char* instead) {
-    if (asked) {
-      throw std::invalid_argument(
-          fmt::format("llmt::distributed::start: {} is not possible beyond one memory; {}", option, instead));
-    }
-  };
-  if (options.branch_rows < 100) {
-    throw std::invalid_argument(
-        fmt::format("llmt::distributed::start: branch_rows is {}, it must be at least 100", options.branch_rows));
-  }
-  if (options.block_rows < 1) {
-    throw std::invalid_argument(
-        fmt::format("llmt::distributed::start: block_rows is {}, it must be at least 1", options.block_rows));
-  }
-  refuse(fit.rule != GrowthRule::rd, "the growth rule", "take rd, or fit a sample that fits into memory");
-  refuse(fit.expert.search == SplitSearch::exact, "exact search", "the top of the tree is searched by bins");
-  refuse(fit.terms != LocalTerms::linear, "a quadratic local model", "take linear ones, or products as columns");
-  refuse(fit.loss != Loss::squared, "Tukey's loss", "take the squared loss; medians over all rows are no sums");
-  refuse(fit.validity == ValidityChoice::gaussian, "validity gaussian", "take crisp, blend or automatic");
-  refuse(std::ranges::any_of(fit.trends, [](Trend trend) { return trend != Trend::any; }), "a trend",
-         "fit a sample that fits into memory");
-  refuse(!fit.split_inputs.empty(), "a list of split_inputs", "leave columns out of the table");
-  refuse(!fit.regression_inputs.empty(), "a list of regression_inputs", "leave columns out of the table");
-  KeptOptions kept;
-  kept.branch_rows = options.branch_rows;
-  kept.block_rows = options.block_rows;
-  kept.max_leaves = fit.max_leaves;
-  kept.min_leaf_samples = fit.min_leaf_samples;
-  kept.significance = fit.significance;
-  kept.pruning = static_cast<Eigen::Index>(fit.pruning);
-  kept.validity = static_cast<Eigen::Index>(fit.validity);
-  kept.sparse = static_cast<Eigen::Index>(fit.sparse);
-  kept.estimation = static_cast<Eigen::Index>(fit.expert.estimation);
-  kept.folds = fit.folds.count;
-  kept.fold_kind = static_cast<Eigen::Index>(fit.folds.kind);
-  kept.seed = fit.folds.seed;
-  kept.intervals = fit.intervals ? 1 : 0;
-  kept.widths = fit.expert.widths;
-  kept.jumps = fit.expert.jumps;
-  kept.ridges = fit.expert.ridges;
-  kept.shrinkages = fit.expert.shrinkages;
-  return kept;
-}
-
 State finish_state(StateData data) {
   data.mark = hash_of(llmt::to_bytes(data));
-  if (data.step == Step::finished && !data.result) {
+  if (data.step >= Step::blend && !data.result) {
     data.result = from_json_with_intervals(to_string(data.model), "the model of a state").model;
+  }
+  if (data.step == Step::blend && !data.sample) {
+    data.sample = from_json(to_string(data.sample_model), "the sample's model of a state");
+    check_sample(data);
   }
   return State(std::make_shared<const StateData>(std::move(data)));
 }
@@ -225,8 +203,28 @@ State start(std::vector<std::string> input_names, std::string output_name, const
     data.input_names.push_back(to_text(name));
   }
   data.output_name = to_text(output_name);
+  data.levels = kept_levels(options.levels, data.input_names);
   return finish_state(std::move(data));
 }
+
+}  // namespace llmt::distributed
+
+namespace llmt {
+
+template <>
+std::span<const Choice<distributed::Step>> choices() {
+  using distributed::Step;
+  static constexpr Choice<Step> steps[] = {{Step::describe, "describe"},
+                                           {Step::grow, "grow"},
+                                           {Step::gather, "gather"},
+                                           {Step::blend, "blend"},
+                                           {Step::finished, "finished"}};
+  return steps;
+}
+
+}  // namespace llmt
+
+namespace llmt::distributed {
 
 Step State::step() const { return data_->step; }
 
@@ -238,29 +236,40 @@ Counts State::counts() const {
     ++counts.top_leaves;
     counts.branches += node.fate == Fate::branch || node.fate == Fate::done ? 1 : 0;
     counts.branches_done += node.fate == Fate::done ? 1 : 0;
-    squares += static_cast<double>(node.rows) * node.held_out_rmse * node.held_out_rmse;
+    squares += node.weight * node.held_out_rmse * node.held_out_rmse;
   }
   if (data_->step == Step::gather) {
     for (const Eigen::Index node : data_->asked) counts.rows_to_come += data_->nodes[node].rows;
   }
-  counts.held_out_rmse = finished() ? std::sqrt(squares / static_cast<double>(data_->rows)) : std::nan("");
+  if (data_->is_blended != 0) {
+    counts.is_of_sample = true;
+    counts.held_out_rmse = data_->sample_rmse;
+    return counts;
+  }
+  counts.held_out_rmse = finished() ? std::sqrt(squares / data_->weight) : std::nan("");
   return counts;
 }
 
+std::vector<std::vector<std::string>> State::levels() const {
+  std::vector<std::vector<std::string>> levels;
+  for (const std::vector<Text>& of_input : data_->levels) levels.push_back(to_strings(of_input));
+  return levels;
+}
+
 const Model& State::model() const {
-  if (!data_->result) throw std::invalid_argument("llmt::distributed::State::model: the fit is not finished");
+  if (!finished()) throw std::invalid_argument("llmt::distributed::State::model: the fit is not finished");
   return *data_->result;
 }
 
 std::string State::model_json() const {
-  if (!data_->result) throw std::invalid_argument("llmt::distributed::State::model_json: the fit is not finished");
+  if (!finished()) throw std::invalid_argument("llmt::distributed::State::model_json: the fit is not finished");
   return to_string(data_->model);
 }
 
 bool State::continues(const State& first) const {
   const StateData& other = first.data();
   return data_->input_names == other.input_names && data_->output_name == other.output_name &&
-         llmt::to_bytes(data_->options) == llmt::to_bytes(other.options);
+         data_->levels == other.levels && llmt::to_bytes(data_->options) == llmt::to_bytes(other.options);
 }
 
 std::string State::to_bytes() const { return sealed('s', llmt::to_bytes(*data_)); }

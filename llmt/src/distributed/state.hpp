@@ -16,11 +16,22 @@
 
 namespace llmt::distributed {
 
+/// Categories of an input: as many as bins of a number may be.
+inline constexpr std::size_t most_levels = 255;
+
+/// The joint equations of the sample's tree have at most so many unknowns: 8 MB.
+inline constexpr Eigen::Index most_unknowns = 1000;
+
 /// Text that base/sums.hpp writes.
 using Text = std::vector<char>;
 
 inline Text to_text(std::string_view from) { return {from.begin(), from.end()}; }
 inline std::string to_string(const Text& from) { return {from.begin(), from.end()}; }
+inline std::vector<std::string> to_strings(const std::vector<Text>& from) {
+  std::vector<std::string> to;
+  for (const Text& text : from) to.push_back(to_string(text));
+  return to;
+}
 
 /// Options that a branch may have, as numbers.
 struct KeptOptions {
@@ -37,6 +48,7 @@ struct KeptOptions {
   Eigen::Index fold_kind = 0;
   std::uint64_t seed = 0;
   Eigen::Index intervals = 0;
+  Eigen::Index weighted = 0;
   std::vector<double> widths;
   std::vector<double> jumps;
   std::vector<double> ridges;
@@ -45,7 +57,7 @@ struct KeptOptions {
   static auto fields(auto& self) {
     return std::tie(self.branch_rows, self.block_rows, self.max_leaves, self.min_leaf_samples, self.significance,
                     self.pruning, self.validity, self.sparse, self.estimation, self.folds, self.fold_kind, self.seed,
-                    self.intervals, self.widths, self.jumps, self.ridges, self.shrinkages);
+                    self.intervals, self.weighted, self.widths, self.jumps, self.ridges, self.shrinkages);
   }
 };
 
@@ -58,14 +70,16 @@ enum class Fate : Eigen::Index {
   done     ///< fit() has finished it
 };
 
-/// A node of the top of the tree. Regressors are scaled, z_j = (x_j - mean_j) / scale_j.
+/// A node of the top of the tree. Its regressors are the inputs that are numbers, scaled: z = (x - mean) / scale.
 struct TopNode {
   Fate fate = Fate::open;
   Eigen::Index left = -1;
   Eigen::Index right = -1;
   Eigen::Index input = -1;
   double threshold = 0.0;
+  std::vector<Eigen::Index> level_side;  ///< of each level of a category that is split: -1 left, 1 right, 0 no row
   Eigen::Index rows = 0;
+  double weight = 0.0;  ///< of the rows, see StateData::weight_scale
   /// Constant and slopes in z, of a model near that of the node: residuals in the sums are those of this model.
   Eigen::VectorXd base;
   std::vector<double> gram;      ///< of [1, z, residual], as GramShape has it, over all rows; empty: not known
@@ -76,8 +90,9 @@ struct TopNode {
   double held_out_rmse = 0.0;  ///< done: of that model; NaN: none
 
   static auto fields(auto& self) {
-    return std::tie(self.fate, self.left, self.right, self.input, self.threshold, self.rows, self.base, self.gram,
-                    self.held_out, self.low, self.high, self.branch, self.held_out_rmse);
+    return std::tie(self.fate, self.left, self.right, self.input, self.threshold, self.level_side, self.rows,
+                    self.weight, self.base, self.gram, self.held_out, self.low, self.high, self.branch,
+                    self.held_out_rmse);
   }
 };
 
@@ -85,30 +100,44 @@ struct StateData {
   KeptOptions options;
   std::vector<Text> input_names;
   Text output_name;
+  std::vector<std::vector<Text>> levels;  ///< of every input: names of its categories; none: numbers
   Step step = Step::describe;
   Eigen::Index passes = 0;
   Eigen::Index blocks = 0;  ///< of the table, and its rows; known after the first pass
   Eigen::Index rows = 0;
-  std::vector<Extent> range;               ///< of every input, and of the output
-  Eigen::VectorXd mean;                    ///< of every input, and of the output
-  Eigen::VectorXd scale;                   ///< what inputs are divided by, and the output
-  std::vector<std::vector<double>> edges;  ///< of every input's bins: bin b holds edges[b - 1] < x <= edges[b]
-  std::vector<TopNode> nodes;              ///< children behind their parents, in pairs
-  std::vector<Eigen::Index> asked;         ///< nodes of the next pass, ascending
-  Extent root_residual;                    ///< of the root's model, in units of the output
-  Text model;                              ///< finished: JSON, with intervals if there are any
+  double weight = 0.0;                            ///< of all rows; their number where they have no weights
+  double weight_scale = 1.0;                      ///< what given weights are multiplied by
+  std::vector<Extent> range;                      ///< of every input, and of the output
+  Eigen::VectorXd mean;                           ///< of every input, and of the output
+  Eigen::VectorXd scale;                          ///< what inputs are divided by, and the output
+  std::vector<std::vector<double>> edges;         ///< of every input's bins: bin b holds edges[b - 1] < x <= edges[b]
+  std::vector<std::vector<double>> level_weight;  ///< of every level of a category: of all rows; if the root has sums
+  std::vector<TopNode> nodes;                     ///< children behind their parents, in pairs
+  std::vector<Eigen::Index> asked;                ///< nodes of the next pass, ascending
+  Extent root_residual;                           ///< of the root's model, in units of the output
+  Text model;                   ///< of top and branches, or finished: JSON, with intervals if there are any
+  Text sample_model;            ///< the tree of the sample, as fit() made it: JSON; empty: there is none
+  double sample_rmse = 0.0;     ///< its held-out error in the sample, later on held-out blocks; NaN: none
+  Eigen::Index is_blended = 0;  ///< finished: the model is the tree of the sample
 
   // Not part of the bytes.
   std::uint64_t mark = 0;       ///< a hash of the bytes: which state sums belong to
   std::optional<Model> result;  ///< of `model`
+  std::optional<Model> sample;  ///< of `sample_model`, for the pass that fits it
 
   Eigen::Index inputs() const { return std::ssize(input_names); }
-  GramShape shape() const { return {inputs() + 1, 1}; }
+  bool is_category(Eigen::Index column) const { return column < inputs() && !levels[column].empty(); }
+  bool is_weighted() const { return options.weighted != 0; }
+  std::vector<Eigen::Index> numbers() const;  ///< the inputs that are no categories
+  GramShape shape() const { return {std::ssize(numbers()) + 1, 1}; }
+  /// Numbers of a row: inputs, output, and the weight if there is one.
+  Eigen::Index row_columns() const { return inputs() + 1 + (is_weighted() ? 1 : 0); }
 
   static auto fields(auto& self) {
-    return std::tie(self.options, self.input_names, self.output_name, self.step, self.passes, self.blocks, self.rows,
-                    self.range, self.mean, self.scale, self.edges, self.nodes, self.asked, self.root_residual,
-                    self.model);
+    return std::tie(self.options, self.input_names, self.output_name, self.levels, self.step, self.passes, self.blocks,
+                    self.rows, self.weight, self.weight_scale, self.range, self.mean, self.scale, self.edges,
+                    self.level_weight, self.nodes, self.asked, self.root_residual, self.model, self.sample_model,
+                    self.sample_rmse, self.is_blended);
   }
 };
 
@@ -126,6 +155,10 @@ FitOptions branch_options(const KeptOptions& kept, int max_threads);
 
 /// Throws std::invalid_argument for what sums over rows cannot do.
 KeptOptions kept_options(const Options& options);
+
+/// Names of categories, of every input. Throws std::invalid_argument naming the input.
+std::vector<std::vector<Text>> kept_levels(const std::vector<std::vector<std::string>>& levels,
+                                           const std::vector<Text>& inputs);
 
 /// Throws std::runtime_error if the parts of a state do not go together.
 void check_state(const StateData& data);

@@ -17,27 +17,34 @@ void require_of_sums(bool holds, const char* what) {
 }
 
 void check_block_sum(const SumsData& data, const BlockSum& sum) {
-  const Eigen::Index columns = data.inputs + 1;
+  const Eigen::Index columns = data.inputs + 1;  // inputs and output
   const bool describes = data.step == Step::describe;
   const Description& description = sum.description;
   const auto has = [](const auto& list, Eigen::Index size) { return std::ssize(list) == size; };
   require_of_sums(has(description.range, describes ? columns : 0) && has(description.total, describes ? columns : 0) &&
                       has(description.missing, describes ? data.inputs : 0) && description.rows >= 0 &&
-                      has(description.sample.values, std::ssize(description.sample.hashes) * columns) &&
+                      has(description.sample.values, std::ssize(description.sample.hashes) * data.columns) &&
                       std::ranges::is_sorted(description.sample.hashes),
                   "the description of the columns");
   require_of_sums(sum.nodes.empty() || data.step == Step::grow, "a node");
   require_of_sums(sum.branches.empty() || data.step == Step::gather, "a branch");
-  const Eigen::Index size = GramShape(columns, 1).size();
+  const JointSums& joint = sum.joint;
+  const bool joins = data.step == Step::blend;
+  const Eigen::Index side = joins ? data.unknowns + 1 : 0;
+  require_of_sums(joint.gram.rows() == side && joint.gram.cols() == side && joint.held_out.rows() == side &&
+                      joint.held_out.cols() == side && std::ssize(joint.leaf_rows) == std::ssize(joint.leaf_squares) &&
+                      std::ssize(joint.leaf_rows) <= data.unknowns,
+                  "the equations of a tree");
+  const Eigen::Index size = GramShape(data.regressors + 1, 1).size();
   for (const auto& [at, node] : sum.nodes) {
     require_of_sums(has(node.grams, data.bins * size) && has(node.counts, data.bins) && has(node.held_out, size) &&
-                        has(node.range, data.inputs) &&
+                        has(node.range, data.regressors) &&
                         std::ranges::all_of(node.counts, [](Eigen::Index count) { return count >= 0; }),
                     "the sums of a node");
   }
   for (const auto& [at, branch] : sum.branches) {
     for (const std::vector<double>& piece : branch.pieces) {
-      require_of_sums(std::ssize(piece) % columns == 0, "the rows of a branch");
+      require_of_sums(std::ssize(piece) % data.columns == 0, "the rows of a branch");
     }
   }
 }
@@ -47,7 +54,9 @@ void check_block_sum(const SumsData& data, const BlockSum& sum) {
 void check_sums(const SumsData& data) {
   constexpr Eigen::Index most_inputs = 1 << 20;
   require_of_sums(data.step >= Step::describe && data.step < Step::finished && data.inputs >= 0 &&
-                      data.inputs < most_inputs && data.bins >= 0 && data.bins <= 256 * data.inputs,
+                      data.inputs < most_inputs && data.regressors >= 0 && data.regressors <= data.inputs &&
+                      data.columns > data.inputs && data.columns <= data.inputs + 2 && data.bins >= 0 &&
+                      data.bins <= 256 * data.inputs && data.unknowns >= 0 && data.unknowns <= most_unknowns,
                   "the number of inputs or bins");
   Eigen::Index behind = -1;
   for (const Run& run : data.runs) {
@@ -88,7 +97,8 @@ Sums merge(Sums a, Sums b) {
   if (b.data() == nullptr || b.data()->runs.empty()) return a.data() == nullptr ? std::move(b) : std::move(a);
   if (a.data() == nullptr || a.data()->runs.empty()) return b;
   const SumsData& other = *b.data();
-  if (a.data()->mark != other.mark || a.data()->inputs != other.inputs || a.data()->bins != other.bins ||
+  if (a.data()->mark != other.mark || a.data()->inputs != other.inputs || a.data()->regressors != other.regressors ||
+      a.data()->columns != other.columns || a.data()->bins != other.bins || a.data()->unknowns != other.unknowns ||
       a.data()->step != other.step) {
     throw std::invalid_argument("llmt::distributed::merge: the sums belong to different states");
   }

@@ -57,6 +57,22 @@ auto adds(const Eigen::MatrixXd& values) {
 
 constexpr Eigen::Index counts_of_rows[] = {1, 2048, 2049, 3 * 2048, 11 * 2048, 20 * 2048 + 7, 64 * 2048};
 
+TEST(SumOver, AnExtentWithoutValuesAddsNothing) {
+  llmt::Extent some;
+  some.widen(2.0);
+  some.widen(3.0);
+  llmt::Extent sum = some;
+  sum += llmt::Extent();
+  EXPECT_EQ(sum.low, 2.0);
+  EXPECT_EQ(sum.high, 3.0);
+  llmt::Extent nothing;
+  nothing += llmt::Extent();
+  EXPECT_FALSE(nothing.low <= nothing.high);
+  nothing += some;
+  EXPECT_EQ(nothing.low, 2.0);
+  EXPECT_EQ(nothing.high, 3.0);
+}
+
 TEST(SumOver, IsTheSameOnAnyNumberOfThreads) {
   for (const Eigen::Index rows : counts_of_rows) {
     const Eigen::MatrixXd values = values_of(rows, 1);

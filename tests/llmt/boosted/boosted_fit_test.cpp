@@ -12,6 +12,8 @@
 #include "llmt/boosted.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
+#include "oracles/boosted_formula.hpp"
+#include "oracles/random_boosted.hpp"
 
 namespace {
 
@@ -30,41 +32,6 @@ llmt::TrainingData friedman(Eigen::Index rows, std::uint64_t seed) {
                          5.0 * x(4) + random.normal();
   }
   return data;
-}
-
-double tree_at(const llmt::BoostedTree& tree, const std::vector<double>& z, int at, double share) {
-  if (at < 0) {
-    const llmt::BoostedLeaf& leaf = tree.leaves[-1 - at];
-    double value = leaf.constant;
-    for (std::size_t k = 0; k < leaf.features.size(); ++k) {
-      if (!std::isnan(z[leaf.features[k]])) value += leaf.slopes[k] * z[leaf.features[k]];
-    }
-    return share * std::min(std::max(value, leaf.low), leaf.high);
-  }
-  const llmt::BoostedSplit& split = tree.splits[at];
-  const double value = z[split.feature];
-  if (std::isnan(value)) return tree_at(tree, z, split.missing_left ? split.left : split.right, share);
-  const double u = (value - split.threshold) / split.half_width;
-  const double right = 0.5 + u * (3.0 - u * u) / 4.0;
-  if (std::abs(value - split.threshold) < split.half_width && share * right >= 0.08 && share * (1.0 - right) >= 0.08) {
-    return tree_at(tree, z, split.left, share * (1.0 - right)) + tree_at(tree, z, split.right, share * right);
-  }
-  return tree_at(tree, z, value <= split.threshold ? split.left : split.right, share);
-}
-
-double sum_at(const llmt::BoostedModel& model, Eigen::Index output, const Eigen::VectorXd& x) {
-  const llmt::BoostedSum& sum = model.sums()[output];
-  std::vector<double> z;
-  for (const llmt::BoostedFeature& feature : sum.features) {
-    const auto of = [&](int input) { return (x(input) - model.inputs()[input].centre) / model.deviations()[input]; };
-    const bool is_level = feature.level >= 0;
-    z.push_back(is_level              ? (std::isnan(x(feature.first)) ? no_value : x(feature.first) == feature.level)
-                : feature.second >= 0 ? of(feature.first) + feature.sign * of(feature.second)
-                                      : of(feature.first));
-  }
-  double value = 0.0;
-  for (const llmt::BoostedTree& tree : sum.trees) value += tree_at(tree, z, tree.splits.empty() ? -1 : 0, 1.0);
-  return sum.base + sum.rate * value;
 }
 
 // Missing values, a categorical input, two outputs.
@@ -87,10 +54,26 @@ TEST(BoostedModel, PredictsTheSumOfItsTreesToTheBit) {
   const llmt::TrainingData data = mixed(400);
   const llmt::BoostedModel model = llmt::fit_boosted(data, {.max_rounds = 30}).model;
   const Eigen::MatrixXd predicted = model.predict(data.inputs, 2);
+  int blends = 0;
   for (Eigen::Index i = 0; i < data.inputs.rows(); ++i) {
-    for (Eigen::Index o = 0; o < 2; ++o) EXPECT_EQ(predicted(i, o), sum_at(model, o, data.inputs.row(i)));
+    for (Eigen::Index o = 0; o < 2; ++o) {
+      EXPECT_EQ(predicted(i, o), boosted_formula::sum_at(model, o, data.inputs.row(i), blends));
+    }
     EXPECT_EQ(model.predict(data.inputs.row(i)), predicted.row(i));
   }
+}
+
+TEST(BoostedModel, BlendsTheSidesOfSoftSplits) {
+  const llmt::BoostedModel model = random_boosted::model({.soft = true}, 1);
+  const Eigen::MatrixXd inputs = random_boosted::rows(200, 1);
+  const Eigen::MatrixXd predicted = model.predict(inputs);
+  int blends = 0;
+  for (Eigen::Index i = 0; i < inputs.rows(); ++i) {
+    for (Eigen::Index o = 0; o < 2; ++o) {
+      EXPECT_NEAR(predicted(i, o), boosted_formula::sum_at(model, o, inputs.row(i), blends), 1e-12);
+    }
+  }
+  EXPECT_GT(blends, 200);
 }
 
 TEST(FitBoosted, IsTheSameBytesAtAnyNumberOfThreads) {

@@ -7,6 +7,7 @@
 
 #include "boosted/growing_tree.hpp"
 #include "llmt/boosted/some_rows.hpp"
+#include "oracles/boosted_formula.hpp"
 
 namespace {
 
@@ -278,25 +279,6 @@ TEST(BoostedTree, IsTheSameWhenItsLeavesAreEstimatedAnew) {
   }
 }
 
-// The sum over the leaves of the products of the shares (J.7) times the leaf's model, held to its range.
-double blended(const llmt::BoostedTree& tree, const Eigen::VectorXd& z, int at, double share, int& blends) {
-  if (at < 0) {
-    const llmt::BoostedLeaf& leaf = tree.leaves[-1 - at];
-    double value = leaf.constant;
-    for (std::size_t k = 0; k < leaf.features.size(); ++k) value += leaf.slopes[k] * z(leaf.features[k]);
-    return share * std::min(std::max(value, leaf.low), leaf.high);
-  }
-  const llmt::BoostedSplit& split = tree.splits[at];
-  const double u = (z(split.feature) - split.threshold) / split.half_width;
-  const double right = 0.5 + u * (3.0 - u * u) / 4.0;
-  if (std::abs(u) < 1.0 && share * right >= 0.08 && share * (1.0 - right) >= 0.08) {
-    ++blends;
-    return blended(tree, z, split.left, share * (1.0 - right), blends) +
-           blended(tree, z, split.right, share * right, blends);
-  }
-  return blended(tree, z, z(split.feature) <= split.threshold ? split.left : split.right, share, blends);
-}
-
 TEST(BoostedTree, OfSoftSplitsBlendsTheSidesOfARow) {
   const Rows rows = some_rows(2000, 2, false, 0.0, 8);
   const Eigen::VectorXd smooth = rows.z.col(0).array().cube();
@@ -316,7 +298,8 @@ TEST(BoostedTree, OfSoftSplitsBlendsTheSidesOfARow) {
     for (const int row : rows.all) {
       int blends = 0;
       const double value = llmt::value_at(tree, rows.binned, row);
-      EXPECT_NEAR(value, blended(done, rows.z.row(row), 0, 1.0, blends), 1e-12);
+      const std::vector<double> z = {rows.z(row, 0), rows.z(row, 1)};
+      EXPECT_NEAR(value, boosted_formula::tree_at(done, z, blends), 1e-12);
       rows_that_blend += blends > 0 ? 1 : 0;
       largest = std::max(largest, std::abs(value - llmt::value_at(crisp, rows.binned, row)));
     }

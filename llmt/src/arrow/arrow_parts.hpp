@@ -1,0 +1,122 @@
+/// \file
+/// What is known of an open Arrow file. Parts are read when they are asked for, by number of byte: a file that somebody
+/// cuts off meanwhile is an error, where mapped memory would end the program.
+#pragma once
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "arrow/flatbuffer.hpp"
+#include "base/descriptor.hpp"
+#include "llmt/arrow.hpp"
+
+namespace llmt {
+
+namespace arrow_file {
+
+/// What the values of a column are, or the indices into its dictionary.
+enum class Numbers { none, int8, int16, int32, int64, uint8, uint16, uint32, uint64, float32, float64 };
+
+/// What text the values of a column or of its dictionary are, by the size of the offsets.
+enum class Text { none, small, large };
+
+struct Column {
+  std::string name;
+  Numbers numbers = Numbers::none;
+  Text text = Text::none;
+  std::optional<std::int64_t> dictionary;  ///< its number; `text` are its values
+  std::size_t buffers = 2;
+
+  bool is_number() const { return numbers != Numbers::none && !dictionary; }
+};
+
+struct Batch {
+  Eigen::Index first = 0;  ///< row
+  Eigen::Index rows = 0;
+  std::int64_t body = 0;                             ///< where it begins in the file
+  std::vector<std::int64_t> missing;                 ///< of every column
+  std::vector<std::array<std::int64_t, 2>> buffers;  ///< offset in the body, and length
+};
+
+inline std::size_t bytes_of(Numbers numbers) {
+  switch (numbers) {
+    case Numbers::none:
+      return 0;
+    case Numbers::int8:
+    case Numbers::uint8:
+      return 1;
+    case Numbers::int16:
+    case Numbers::uint16:
+      return 2;
+    case Numbers::int32:
+    case Numbers::uint32:
+    case Numbers::float32:
+      return 4;
+    default:
+      return 8;
+  }
+}
+
+}  // namespace arrow_file
+
+struct ArrowTable::Parts {
+  std::string path;
+  Descriptor file;
+  std::int64_t size = 0;
+  std::vector<arrow_file::Column> columns;
+  std::vector<std::string> names;
+  std::vector<arrow_file::Batch> batches;
+  std::map<std::int64_t, std::vector<std::string>> dictionaries;  ///< of text
+  Eigen::Index rows = 0;
+
+  [[noreturn]] void fail(const std::string& why) const { throw std::runtime_error(fmt::format("{}: {}", path, why)); }
+
+  std::string read(std::int64_t at, std::int64_t count) const {
+    if (at < 0 || count < 0 || at > size || count > size - at) fail("a part lies outside of the file; it is cut off");
+    std::string bytes(static_cast<std::size_t>(count), '\0');
+    for (std::int64_t done = 0; done < count;) {
+      const ssize_t got =
+          ::pread(file.number(), bytes.data() + done, static_cast<std::size_t>(count - done), at + done);
+      if (got < 0 && errno == EINTR) continue;
+      if (got < 0) fail(fmt::format("cannot be read: {}", std::strerror(errno)));
+      if (got == 0) fail("became shorter while it was read");
+      done += got;
+    }
+    return bytes;
+  }
+
+  const arrow_file::Column& column(const std::string& name) const;
+
+  /// The first buffer of a column among those of a batch.
+  std::size_t first_buffer(const arrow_file::Column& column) const;
+
+  /// Rows begin ... end - 1 of a batch; NaN where a value is missing.
+  void read_numbers(const arrow_file::Batch& batch, const arrow_file::Column& column, Eigen::Index begin,
+                    Eigen::Index end, Eigen::Ref<Eigen::VectorXd> to) const;
+
+  std::vector<bool> read_valid(const arrow_file::Batch& batch, const arrow_file::Column& column, Eigen::Index begin,
+                               Eigen::Index end) const;
+
+  /// The texts of rows begin ... end - 1 whose first buffer is `buffer`. `column`: for errors.
+  std::vector<std::string> read_texts(const arrow_file::Batch& batch, std::size_t buffer, arrow_file::Text text,
+                                      Eigen::Index begin, Eigen::Index end, const std::string& column) const;
+
+  void read_schema(const FlatTable& schema);
+  void read_dictionary(std::string_view block);
+  void read_batch(std::string_view block);
+  void read_all();
+};
+
+}  // namespace llmt

@@ -1,0 +1,59 @@
+// What a sum of trees predicts, by the equations (J.1) and (J.7) of docs/algorithms/boosting.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "llmt/boosted_model.hpp"
+
+namespace boosted_formula {
+
+/// The sum over the leaves below `at` of the shares of a row times the leaf's model, held to its range. `z`: the row's
+/// features. `blends` counts the splits at which the row goes to both sides.
+inline double tree_at(const llmt::BoostedTree& tree, const std::vector<double>& z, int at, double share, int& blends) {
+  if (at < 0) {
+    const llmt::BoostedLeaf& leaf = tree.leaves[-1 - at];
+    double value = leaf.constant;
+    for (std::size_t k = 0; k < leaf.features.size(); ++k) {
+      if (!std::isnan(z[leaf.features[k]])) value += leaf.slopes[k] * z[leaf.features[k]];
+    }
+    return share * std::min(std::max(value, leaf.low), leaf.high);
+  }
+  const llmt::BoostedSplit& split = tree.splits[at];
+  const double value = z[split.feature];
+  if (std::isnan(value)) return tree_at(tree, z, split.missing_left ? split.left : split.right, share, blends);
+  const double u = (value - split.threshold) / split.half_width;
+  const double right = 0.5 + u * (3.0 - u * u) / 4.0;
+  if (std::abs(value - split.threshold) < split.half_width && share * right >= 0.08 && share * (1.0 - right) >= 0.08) {
+    ++blends;
+    const double left_value = tree_at(tree, z, split.left, share * (1.0 - right), blends);
+    return left_value + tree_at(tree, z, split.right, share * right, blends);
+  }
+  return tree_at(tree, z, value <= split.threshold ? split.left : split.right, share, blends);
+}
+
+inline double tree_at(const llmt::BoostedTree& tree, const std::vector<double>& z, int& blends) {
+  return tree_at(tree, z, tree.splits.empty() ? -1 : 0, 1.0, blends);
+}
+
+inline double sum_at(const llmt::BoostedModel& model, Eigen::Index output, const Eigen::VectorXd& x, int& blends) {
+  const llmt::BoostedSum& sum = model.sums()[output];
+  std::vector<double> z;
+  for (const llmt::BoostedFeature& feature : sum.features) {
+    const auto of = [&](int input) { return (x(input) - model.inputs()[input].centre) / model.deviations()[input]; };
+    const double level = x(feature.first);
+    const auto levels = static_cast<double>(model.inputs()[feature.first].levels.size());
+    const double is_level = level < levels ? level == feature.level : std::numeric_limits<double>::quiet_NaN();
+    z.push_back(feature.level >= 0    ? is_level
+                : feature.second >= 0 ? of(feature.first) + feature.sign * of(feature.second)
+                                      : of(feature.first));
+  }
+  double value = 0.0;
+  for (const llmt::BoostedTree& tree : sum.trees) value += tree_at(tree, z, blends);
+  return sum.base + sum.rate * value;
+}
+
+}  // namespace boosted_formula
