@@ -270,7 +270,8 @@ std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector
 
 std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::vector<ModelTerm>& terms,
                                            const Inputs& inputs) {
-  constexpr double visible = 2.0;  // standard deviations
+  // Up to 3 the sign of the input may be wrong, and what the simulation has of it.
+  constexpr double visible = 4.0;  // standard deviations
   std::set<std::size_t> narrow;
   const auto has_width = [&](const FoundTerm& found) {
     const std::vector<TermConstant>& constants = terms[found.term].constants;

@@ -47,7 +47,7 @@ void demand_certainty(Missing& missing);
 /// the largest damping ratio tried or more: a filter, no machine, has such constants.
 std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms);
 
-/// The indices in `terms` of those that were found with a width below twice the standard deviation of the errors of
+/// The indices in `terms` of those that were found with a width below 4 standard deviations of the errors of
 /// their input: the errors smear what is so narrow, and it follows single rows.
 std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::vector<ModelTerm>& terms,
                                            const Inputs& inputs);
