@@ -30,9 +30,15 @@ void TreeGrower::begin(const Eigen::VectorXd& residuals) {
   root.end = std::ssize(order_);
   root.model.constant = sum / weight;
   for (std::size_t k = 0; k < order_.size(); ++k) residuals_[k] = residuals(order_[k]) - root.model.constant;
-  units_ = units_of(residuals_, weights_, rows_.equal_weights);
-  for (std::size_t k = 0; k < order_.size(); ++k) terms_[k] = packed(residuals_[k], weights_[k], units_);
+  if (is_searching_) {
+    units_ = units_of(residuals_, weights_, rows_.equal_weights);
+    pack(root);
+  }
   tree_ = {root};
+}
+
+void TreeGrower::pack(const GrowingNode& node) {
+  for (Eigen::Index k = node.begin; k < node.end; ++k) terms_[k] = packed(residuals_[k], weights_[k], units_);
 }
 
 std::vector<int> TreeGrower::some_features(Random& random) const {
@@ -149,10 +155,8 @@ void TreeGrower::add_to_path(GrowingNode& side, int feature) {
       side.model.slopes[found - side.model.features.begin()] += slope;
     }
   }
-  for (Eigen::Index k = side.begin; k < side.end; ++k) {
-    residuals_[k] -= constant + slope * waiting[k];
-    terms_[k] = packed(residuals_[k], weights_[k], units_);
-  }
+  for (Eigen::Index k = side.begin; k < side.end; ++k) residuals_[k] -= constant + slope * waiting[k];
+  if (is_searching_) pack(side);
 }
 
 void TreeGrower::split(std::span<const int> leaves, std::span<const Choice> choices) {
@@ -185,6 +189,7 @@ void TreeGrower::grow_symmetric(Random& random) {
   std::vector<int> leaves = {0};
   for (int level = 0; level < options_.depth; ++level) {
     const Choice best = best_split(leaves, some_features(random));
+    is_searching_ = level + 1 < options_.depth;
     if (best.feature < 0) continue;
     std::vector<int> with_rows;
     for (const int leaf : leaves) {
@@ -216,6 +221,7 @@ void TreeGrower::grow_free(Random& random) {
 }
 
 GrowingTree TreeGrower::grow(const Eigen::VectorXd& residuals, Random& random) {
+  is_searching_ = true;
   begin(residuals);
   if (options_.symmetric) {
     grow_symmetric(random);
@@ -227,6 +233,7 @@ GrowingTree TreeGrower::grow(const Eigen::VectorXd& residuals, Random& random) {
 }
 
 GrowingTree TreeGrower::estimate(const GrowingTree& tree, const Eigen::VectorXd& residuals) {
+  is_searching_ = false;
   begin(residuals);
   // A split comes after the one above it, so the nodes are numbered anew in the same order.
   std::vector<int> number(tree.size(), 0);

@@ -102,6 +102,7 @@ class TreeGrower {
   };
 
   void begin(const Eigen::VectorXd& residuals);
+  void pack(const GrowingNode& node);
   std::vector<int> some_features(Random& random) const;
   Choice best_of_feature(std::span<const int> leaves, int feature) const;
   Choice best_split(std::span<const int> leaves, const std::vector<int>& features) const;
@@ -130,7 +131,8 @@ class TreeGrower {
   std::vector<int> order_;         // the rows, those of a node together
   std::vector<double> residuals_;  // of the node's own model, in that order
   std::vector<double> weights_;    // in that order
-  std::vector<PackedSum> terms_;   // in that order
+  std::vector<PackedSum> terms_;   // in that order, while splits are searched
+  bool is_searching_ = true;
   std::vector<int> spare_order_;
   std::vector<double> spare_residuals_;
   std::vector<double> spare_weights_;

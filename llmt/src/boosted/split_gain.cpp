@@ -12,6 +12,7 @@ namespace {
 struct RunningSums {
   int count = 0;
   std::array<int, most_bins + 1> bin;
+  std::array<int, most_bins> count_up_to;  // each bin of the feature
   std::array<double, most_bins + 1> weight;
   std::array<double, most_bins + 1> residual;
   std::array<double, most_bins + 1> z;
@@ -35,19 +36,22 @@ void run(RunningSums& sums, const BinnedFeature& feature, const Histogram& histo
     sums.count = 1;
   }
   const int bins = feature.num_bins();
+  const int first = sums.count;
   for (int b = 0; b < bins; ++b) {
-    const PackedSum sum = histogram[b];
+    sums.bin[sums.count] = b;
+    sums.count += histogram[b] != 0 ? 1 : 0;
+    sums.count_up_to[b] = sums.count;
+  }
+  for (int k = first; k < sums.count; ++k) {
+    const PackedSum sum = histogram[sums.bin[k]];
     const double weight = static_cast<double>(weight_of(sum)) * units.weight;
     const double residual = static_cast<double>(residual_of(sum)) * units.residual;
-    const double centre = feature.centres[b];
-    const int k = sums.count;
-    sums.bin[k] = b;
+    const double centre = feature.centres[sums.bin[k]];
     sums.weight[k] = all.weight += weight;
     sums.residual[k] = all.residual += residual;
     sums.z[k] = all.z += weight * centre;
     sums.zz[k] = all.zz += weight * centre * centre;
     sums.ze[k] = all.ze += residual * centre;
-    sums.count += sum != 0 ? 1 : 0;
   }
   if (!missing_left) {
     all.weight += missing_weight;
@@ -95,18 +99,12 @@ void add_gains(Gains& gains, const BinnedFeature& feature, const Histogram& hist
                const Ridges& ridges, bool slopes, bool missing_left) {
   RunningSums sums;
   run(sums, feature, histogram, units, missing_left);
-  std::array<double, most_bins + 1> of_bin;
-  gains_at(of_bin.data(), sums, ridges, slopes ? 1.0 : 0.0);
+  std::array<double, most_bins + 2> of_count;
+  gains_at(of_count.data() + 1, sums, ridges, slopes ? 1.0 : 0.0);
   const SideSums& all = sums.all;
   const Fraction unsplit = gain_of(all.weight, all.residual, all.z, all.zz, all.ze, ridges, slopes ? 1.0 : 0.0);
-  double gain = unsplit.above / unsplit.below - all.residual * all.residual / (all.weight + ridges.constant);
-  int t = 0;
-  const int thresholds = feature.num_bins() - 1;
-  for (int k = 0; k < sums.count; ++k) {
-    for (; t < std::min(sums.bin[k], thresholds); ++t) gains[t] += gain;
-    gain = of_bin[k];
-  }
-  for (; t < thresholds; ++t) gains[t] += gain;
+  of_count[0] = unsplit.above / unsplit.below - all.residual * all.residual / (all.weight + ridges.constant);
+  for (int t = 0; t + 1 < feature.num_bins(); ++t) gains[t] += of_count[sums.count_up_to[t]];
 }
 
 }  // namespace llmt

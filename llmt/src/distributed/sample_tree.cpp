@@ -4,7 +4,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -19,10 +18,8 @@
 namespace llmt::distributed {
 namespace {
 
-// Ridges of the joint equations, as multiples of their diagonal: towards the local models of the sample.
-constexpr std::array<double, 6> joint_ridges = {1e-8, 1e-6, 1e-4, 1e-2, 1e-1, 1.0};
-// Without held-out blocks.
-constexpr double ridge_unseen = 1e-6;
+// The ridge of the joint equations, as a multiple of their diagonal: for directions that no row determines.
+constexpr double joint_ridge = 1e-6;
 
 const Partition& tree_of(const StateData& data) { return data.sample->partitions().front(); }
 
@@ -61,35 +58,23 @@ std::vector<Eigen::Index> leaf_places(const Partition& tree) {
   return places;
 }
 
-// Mean square of the residuals after a change of the coefficients.
-double mean_square(const Eigen::MatrixXd& gram, const Eigen::VectorXd& change, double weight) {
+// Squares of the residuals after a change of the coefficients.
+double squares_after(const Eigen::MatrixXd& gram, const Eigen::VectorXd& change) {
   const Eigen::Index count = change.size();
   const auto products = gram.topLeftCorner(count, count).selfadjointView<Eigen::Lower>();
   const double squares =
       gram(count, count) - 2.0 * gram.row(count).head(count).dot(change) + change.dot((products * change).eval());
-  return std::max(squares, 0.0) / weight;
+  return std::max(squares, 0.0);
 }
 
-Eigen::VectorXd solve_joint(const Eigen::MatrixXd& gram, double ridge) {
+Eigen::VectorXd solve_joint(const Eigen::MatrixXd& gram) {
   const Eigen::Index count = gram.rows() - 1;
   Eigen::MatrixXd equations = gram.topLeftCorner(count, count);
   for (Eigen::Index k = 0; k < count; ++k) {
     const double own = equations(k, k);
-    equations(k, k) = own > 0.0 ? own * (1.0 + ridge) : 1.0;  // what does not vary does not change
+    equations(k, k) = own > 0.0 ? own * (1.0 + joint_ridge) : 1.0;  // what does not vary does not change
   }
   return equations.selfadjointView<Eigen::Lower>().ldlt().solve(gram.row(count).head(count).transpose());
-}
-
-// The ridge with the smallest error on held-out blocks, which it returns, too; NaN: there are too few rows.
-std::pair<double, double> choose_ridge(const JointSums& sums) {
-  std::pair<double, double> best = {ridge_unseen, std::nan("")};
-  if (sums.held_out_weight < static_cast<double>(2 * sums.gram.rows())) return best;
-  const Eigen::MatrixXd others = sums.gram - sums.held_out;
-  for (const double ridge : joint_ridges) {
-    const double error = mean_square(sums.held_out, solve_joint(others, ridge), sums.held_out_weight);
-    if (!(error >= best.second)) best = {ridge, error};
-  }
-  return best;
 }
 
 // Akaike's final prediction error (1970): the error on new rows of a model that has `coefficients`.
@@ -184,7 +169,6 @@ void take_sample(StateData& data, const Sample& sample, const Progress& progress
   data.sample = result.model;
   if (unknowns_of(data) <= most_unknowns) {
     data.sample_model = to_text(to_json(result.model));
-    data.sample_rmse = result.summary.partitions.front().chosen.rmse;
   }
   data.sample.reset();  // finish_state() reads it where it is needed
 }
@@ -205,7 +189,6 @@ void add_joint(const StateData& data, const Block& block, JointSums& sums) {
   const Eigen::Index each = 1 + std::ssize(data.sample->regressors());
   const Eigen::Index unknowns = unknowns_of(data);
   sums.gram = Eigen::MatrixXd::Zero(unknowns + 1, unknowns + 1);
-  sums.held_out = sums.gram;
   sums.leaf_rows.assign(tree.num_leaves(), 0);
   sums.leaf_squares.assign(tree.num_leaves(), 0.0);
   std::vector<Activation> active;
@@ -238,27 +221,20 @@ void add_joint(const StateData& data, const Block& block, JointSums& sums) {
     while (validities.left(leaf) >= 0) leaf = validities.child_of(leaf, inputs.data());
     ++sums.leaf_rows[places[leaf]];
     sums.leaf_squares[places[leaf]] += weight * residual * residual;
-    if (is_held_out(block.number)) sums.held_out_weight += weight;
   }
-  if (is_held_out(block.number)) sums.held_out = sums.gram;  // a block is held out as a whole
 }
 
 void take_joint(StateData& data, JointSums sums) {
   if (std::ssize(sums.leaf_rows) != tree_of(data).num_leaves()) {
     throw std::runtime_error("llmt::distributed::advance: the sums have not the leaves of the sample's tree");
   }
-  const auto [ridge, held_out] = choose_ridge(sums);
-  const Eigen::VectorXd change = solve_joint(sums.gram, ridge);
-  const double own = mean_square(sums.gram, change, 1.0);
-  const Partition& other = data.result->partitions().front();
-  const double unit = data.scale(data.inputs());
-  const bool is_better =
-      change.allFinite() && expected_error(own, data.weight, unknowns_of(data)) <
-                                expected_error(sums.tree_squares, data.weight, coefficients_of(other));
-  if (std::isfinite(held_out)) data.sample_rmse = unit * std::sqrt(held_out);
-  if (is_better) {
+  const Eigen::VectorXd change = solve_joint(sums.gram);
+  const double error = expected_error(squares_after(sums.gram, change), data.weight, unknowns_of(data));
+  const Eigen::Index of_other = coefficients_of(data.result->partitions().front());
+  if (change.allFinite() && error < expected_error(sums.tree_squares, data.weight, of_other)) {
     data.model = to_text(to_json(joined(data, sums, change)));
     data.is_blended = 1;
+    data.sample_rmse = data.scale(data.inputs()) * std::sqrt(error);
   }
   data.sample_model.clear();
   data.sample.reset();

@@ -20,16 +20,13 @@ struct Sample;
 /// regressor, leaf after leaf; the last row and column of a matrix are those of the residual of the sample's model.
 struct JointSums {
   Eigen::MatrixXd gram;                 ///< (unknowns + 1)^2, the lower triangle; over all rows
-  Eigen::MatrixXd held_out;             ///< the same over the rows of held-out blocks
-  double held_out_weight = 0.0;         ///< of these rows
   std::vector<Eigen::Index> leaf_rows;  ///< in the box of each leaf
   std::vector<double> leaf_squares;     ///< weighted squares of the residuals of the sample's model there
   double tree_squares = 0.0;            ///< the same of the model of top and branches, over all rows
   Extent root_residual;                 ///< of the root of the sample's tree
 
   static auto fields(auto& self) {
-    return std::tie(self.gram, self.held_out, self.held_out_weight, self.leaf_rows, self.leaf_squares,
-                    self.tree_squares, self.root_residual);
+    return std::tie(self.gram, self.leaf_rows, self.leaf_squares, self.tree_squares, self.root_residual);
   }
 };
 

@@ -228,15 +228,26 @@ namespace llmt::distributed {
 
 Step State::step() const { return data_->step; }
 
+namespace {
+
+// Of top and branches, all of which are done; NaN: not all have held out rows.
+double held_out_rmse(const StateData& data) {
+  double squares = 0.0;
+  for (const TopNode& node : data.nodes) {
+    if (node.fate != Fate::inner) squares += node.weight * node.held_out_rmse * node.held_out_rmse;
+  }
+  return std::sqrt(squares / data.weight);
+}
+
+}  // namespace
+
 Counts State::counts() const {
   Counts counts{.passes = data_->passes, .rows = data_->rows};
-  double squares = 0.0;
   for (const TopNode& node : data_->nodes) {
     if (node.fate == Fate::inner) continue;
     ++counts.top_leaves;
     counts.branches += node.fate == Fate::branch || node.fate == Fate::done ? 1 : 0;
     counts.branches_done += node.fate == Fate::done ? 1 : 0;
-    squares += node.weight * node.held_out_rmse * node.held_out_rmse;
   }
   if (data_->step == Step::gather) {
     for (const Eigen::Index node : data_->asked) counts.rows_to_come += data_->nodes[node].rows;
@@ -246,7 +257,7 @@ Counts State::counts() const {
     counts.held_out_rmse = data_->sample_rmse;
     return counts;
   }
-  counts.held_out_rmse = finished() ? std::sqrt(squares / data_->weight) : std::nan("");
+  counts.held_out_rmse = finished() ? llmt::distributed::held_out_rmse(*data_) : std::nan("");
   return counts;
 }
 

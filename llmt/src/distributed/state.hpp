@@ -117,7 +117,7 @@ struct StateData {
   Extent root_residual;                           ///< of the root's model, in units of the output
   Text model;                   ///< of top and branches, or finished: JSON, with intervals if there are any
   Text sample_model;            ///< the tree of the sample, as fit() made it: JSON; empty: there is none
-  double sample_rmse = 0.0;     ///< its held-out error in the sample, later on held-out blocks; NaN: none
+  double sample_rmse = 0.0;     ///< is_blended: its expected error on new rows (W.4)
   Eigen::Index is_blended = 0;  ///< finished: the model is the tree of the sample
 
   // Not part of the bytes.

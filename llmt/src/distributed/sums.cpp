@@ -31,8 +31,8 @@ void check_block_sum(const SumsData& data, const BlockSum& sum) {
   const JointSums& joint = sum.joint;
   const bool joins = data.step == Step::blend;
   const Eigen::Index side = joins ? data.unknowns + 1 : 0;
-  require_of_sums(joint.gram.rows() == side && joint.gram.cols() == side && joint.held_out.rows() == side &&
-                      joint.held_out.cols() == side && std::ssize(joint.leaf_rows) == std::ssize(joint.leaf_squares) &&
+  require_of_sums(joint.gram.rows() == side && joint.gram.cols() == side &&
+                      std::ssize(joint.leaf_rows) == std::ssize(joint.leaf_squares) &&
                       std::ssize(joint.leaf_rows) <= data.unknowns,
                   "the equations of a tree");
   const Eigen::Index size = GramShape(data.regressors + 1, 1).size();

@@ -1,4 +1,5 @@
-// Weights and categories beyond one memory, beside repeated rows, fit() in memory, and brute force.
+// Weights, categories and the tree of the sample beyond one memory, beside repeated rows, fit() in memory, and brute
+// force.
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
@@ -214,88 +215,6 @@ TEST(WordsBeyondMemory, ATableOfCategoriesAloneHasTheirMeans) {
   }
 }
 
-TEST(SampleTree, ItsEquationsHaveTheValiditiesOfItsLeaves) {
-  Weighed table = made(1200, 12);
-  Random random(13);
-  table.weights.resize(1200);
-  for (double& weight : table.weights) weight = random.uniform(0.0, 2.0);
-  Options options = with(400, true, true);
-  options.fit.validity = ValidityChoice::blend;
-  options.fit.folds.count = 0;
-  State state = start({"a", "b", "c"}, "y", options);
-  const auto sum_all = [&] {
-    Sums all;
-    for (Eigen::Index first = 0; first < 1200; first += rows_of_block) {
-      const Weighed shard = table.rows(first, rows_of_block);
-      all = merge(std::move(all), sums({shard.inputs, shard.output, first / rows_of_block, shard.weights}, state, 1));
-    }
-    return all;
-  };
-  while (state.step() != Step::blend) state = advance(state, sum_all(), {}, 1);
-  Sums all = sum_all();
-  const JointSums joint = std::move(all.data()->runs.front().sums).total(6).joint;
-  const StateData& data = state.data();
-  const Partition& tree = data.sample->partitions().front();
-  ASSERT_EQ(tree.validity.kind, ValidityKind::blend);
-  ASSERT_GE(tree.num_leaves(), 3);
-  // A leaf that is 1 in a tree that is 0 elsewhere predicts its validity.
-  Eigen::MatrixXd validities(1200, tree.num_leaves());
-  Eigen::Index leaf = 0;
-  for (std::size_t at = 0; at < tree.nodes.size(); ++at) {
-    if (!tree.nodes[at].is_leaf()) continue;
-    Partition one = tree;
-    one.residual_range.resize(0, 0);
-    one.outer_slope = Eigen::MatrixXd::Zero(1, tree.outer_slope.cols());
-    for (Node& node : one.nodes) {
-      node.slope.setZero();
-      node.value(0) = &node == &one.nodes[at] ? 1.0 : 0.0;
-    }
-    const Model model(data.sample->inputs(), data.sample->outputs(), data.sample->regressors(), {one});
-    validities.col(leaf++) = model.predict(table.inputs, 1);
-  }
-  const Eigen::VectorXd weights = data.weight_scale * table.weights;
-  const Eigen::Index each = 1 + std::ssize(data.sample->regressors());
-  const Eigen::VectorXd residuals =
-      (table.output - data.sample->predict(table.inputs, 1).col(0)) / data.scale(data.inputs());
-  for (Eigen::Index i = 0; i < leaf; ++i) {
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      const double expected = (weights.array() * validities.col(i).array() * validities.col(j).array()).sum();
-      EXPECT_NEAR(joint.gram(i * each, j * each), expected, 1e-9 * 1200.0);
-    }
-    EXPECT_NEAR(joint.gram(leaf * each, i * each),
-                (weights.array() * validities.col(i).array() * residuals.array()).sum(), 1e-8 * 1200.0);
-  }
-  EXPECT_NEAR(joint.gram(leaf * each, leaf * each), (weights.array() * residuals.array().square()).sum(),
-              1e-8 * 1200.0);
-}
-
-TEST(SampleTree, IsTakenWhereRowsAreFewForBranchesAndLeftWhereTheyAreNot) {
-  const auto noisy = [](Eigen::Index rows, double noise, std::uint64_t seed) {
-    Random random(seed);
-    Weighed table{Eigen::MatrixXd(rows, 3), Eigen::VectorXd(rows), {}};
-    for (double& value : table.inputs.reshaped()) value = random.uniform(-1.0, 1.0);
-    for (Eigen::Index i = 0; i < rows; ++i) {
-      table.output(i) = 3.0 * std::sin(3.0 * table.inputs(i, 0)) + table.inputs(i, 1) + noise * random.normal();
-    }
-    return table;
-  };
-  Options options = with(500, false, false);
-  options.fit.validity = ValidityChoice::automatic;
-  const Weighed few = noisy(3000, 2.0, 14);
-  const State of_few = run(few, options);
-  EXPECT_TRUE(of_few.counts().is_of_sample);
-  const Weighed truth = noisy(3000, 0.0, 15);
-  TrainingData data{.inputs = few.inputs, .outputs = few.output};
-  EXPECT_LE(rmse_on(of_few.model(), truth), 1.05 * rmse_on(fit(data, options.fit).model, truth));
-  Eigen::Index samples = 0;
-  for (const Node& node : of_few.model().partitions()[0].nodes) samples += node.is_leaf() ? node.samples : 0;
-  EXPECT_EQ(samples, 3000);
-  // Six leaves are too few for a function that has hardly any noise.
-  const State of_many = run(noisy(3000, 0.01, 16), with(500, false, false));
-  EXPECT_FALSE(of_many.counts().is_of_sample);
-  EXPECT_GT(of_many.model().partitions()[0].num_leaves(), 6);
-}
-
 TEST(WeightsBeyondMemory, WhatDoesNotGoIsNamed) {
   const auto says = [](const auto& call, const char* text) {
     try {
@@ -329,6 +248,102 @@ TEST(WeightsBeyondMemory, WhatDoesNotGoIsNamed) {
   options.levels[2].clear();
   for (int level = 0; level < 256; ++level) options.levels[2].push_back(std::to_string(level));
   says([&] { start({"a", "b", "c"}, "y", options); }, "input \"c\" has 256 categories, 255 are possible");
+}
+
+TEST(SampleTree, ItsEquationsHaveTheValiditiesOfItsLeaves) {
+  constexpr Eigen::Index rows = 17000;  // more than the sample
+  Weighed table = made(rows, 12);
+  Random random(13);
+  table.weights.resize(rows);
+  for (double& weight : table.weights) weight = random.uniform(0.0, 2.0);
+  Options options = with(8000, true, true);
+  options.fit.validity = ValidityChoice::blend;
+  options.fit.folds.count = 0;
+  State state = start({"a", "b", "c"}, "y", options);
+  const auto sum_all = [&] {
+    Sums all;
+    for (Eigen::Index first = 0; first < rows; first += rows_of_block) {
+      const Weighed shard = table.rows(first, rows_of_block);
+      all = merge(std::move(all), sums({shard.inputs, shard.output, first / rows_of_block, shard.weights}, state, 1));
+    }
+    return all;
+  };
+  while (state.step() != Step::blend) state = advance(state, sum_all(), {}, 1);
+  Sums all = sum_all();
+  // In another order of merging.
+  Sums other;
+  for (Eigen::Index last = rows; last > 0; last -= 1000) {
+    const Weighed shard = table.rows(last - 1000, 1000);
+    const Eigen::Index block = (last - 1000) / rows_of_block;
+    other = merge(std::move(other), sums({shard.inputs, shard.output, block, shard.weights}, state, 2));
+  }
+  EXPECT_EQ(other.to_bytes(), all.to_bytes());
+  const JointSums joint = std::move(all.data()->runs.front().sums).total(rows / rows_of_block).joint;
+  const StateData& data = state.data();
+  const Partition& tree = data.sample->partitions().front();
+  ASSERT_EQ(tree.validity.kind, ValidityKind::blend);
+  ASSERT_GE(tree.num_leaves(), 3);
+  // A leaf that is 1 in a tree that is 0 elsewhere predicts its validity.
+  Eigen::MatrixXd validities(rows, tree.num_leaves());
+  Eigen::Index leaf = 0;
+  for (std::size_t at = 0; at < tree.nodes.size(); ++at) {
+    if (!tree.nodes[at].is_leaf()) continue;
+    Partition one = tree;
+    one.residual_range.resize(0, 0);
+    one.outer_slope = Eigen::MatrixXd::Zero(1, tree.outer_slope.cols());
+    for (Node& node : one.nodes) {
+      node.slope.setZero();
+      node.value(0) = &node == &one.nodes[at] ? 1.0 : 0.0;
+    }
+    const Model model(data.sample->inputs(), data.sample->outputs(), data.sample->regressors(), {one});
+    validities.col(leaf++) = model.predict(table.inputs, 1);
+  }
+  const Eigen::VectorXd weights = data.weight_scale * table.weights;
+  const Eigen::Index each = 1 + std::ssize(data.sample->regressors());
+  const Eigen::VectorXd residuals =
+      (table.output - data.sample->predict(table.inputs, 1).col(0)) / data.scale(data.inputs());
+  for (Eigen::Index i = 0; i < leaf; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const double expected = (weights.array() * validities.col(i).array() * validities.col(j).array()).sum();
+      EXPECT_NEAR(joint.gram(i * each, j * each), expected, 1e-9 * static_cast<double>(rows));
+    }
+    EXPECT_NEAR(joint.gram(leaf * each, i * each),
+                (weights.array() * validities.col(i).array() * residuals.array()).sum(),
+                1e-8 * static_cast<double>(rows));
+  }
+  EXPECT_NEAR(joint.gram(leaf * each, leaf * each), (weights.array() * residuals.array().square()).sum(),
+              1e-8 * static_cast<double>(rows));
+}
+
+Weighed noisy(Eigen::Index rows, double noise, std::uint64_t seed) {
+  Random random(seed);
+  Weighed table{Eigen::MatrixXd(rows, 3), Eigen::VectorXd(rows), {}};
+  for (double& value : table.inputs.reshaped()) value = random.uniform(-1.0, 1.0);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    table.output(i) = 3.0 * std::sin(3.0 * table.inputs(i, 0)) + table.inputs(i, 1) + noise * random.normal();
+  }
+  return table;
+}
+
+TEST(SampleTree, IsTakenWhereRowsAreFewForBranchesAndLeftWhereTheyAreNot) {
+  const Weighed truth = noisy(3000, 0.0, 16);
+  Options options = with(3000, false, false);
+  options.fit.folds.count = 2;
+  options.fit.validity = ValidityChoice::blend;
+  const Weighed few = noisy(20000, 3.0, 17);
+  const State state = run(few, options);
+  EXPECT_TRUE(state.counts().is_of_sample);
+  EXPECT_EQ(state.step(), Step::finished);
+  TrainingData data{.inputs = few.inputs, .outputs = few.output};
+  EXPECT_LE(rmse_on(state.model(), truth), 1.1 * rmse_on(fit(data, options.fit).model, truth));
+  Eigen::Index samples = 0;
+  for (const Node& node : state.model().partitions()[0].nodes) samples += node.is_leaf() ? node.samples : 0;
+  EXPECT_EQ(samples, 20000);
+  EXPECT_EQ(from_json(state.model_json()).predict(truth.inputs), state.model().predict(truth.inputs));
+  // Six leaves are too few for a function that has hardly any noise.
+  const State sharp = run(noisy(20000, 0.01, 18), with(3000, false, false));
+  EXPECT_FALSE(sharp.counts().is_of_sample);
+  EXPECT_GT(sharp.model().partitions()[0].num_leaves(), 6);
 }
 
 }  // namespace
