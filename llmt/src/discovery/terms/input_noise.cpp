@@ -206,7 +206,7 @@ InputNoise::AddedByErrors InputNoise::added(const TermData& data, const std::vec
 namespace {
 
 // Covariance of estimates, in units of the variance of the samples: the sandwich inverse S inverse', S the sum of the
-// squares of the samples' `scores` (Carroll et al. 2006, appendix A.6). Errors of an input count where the model is
+// squares of the samples' `scores` (Carroll et al. 2006). Errors of an input count where the model is
 // steep in it, so samples do not scatter alike. The few that determine a coefficient pull it towards themselves; their
 // scores are divided by 1 - h, h the diagonal of the hat matrix (HC3 of MacKinnon and White 1985).
 Eigen::MatrixXd sandwich(const Eigen::LDLT<Eigen::MatrixXd>& inverse, const Eigen::MatrixXd& jacobian,
