@@ -155,7 +155,8 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
     refuse_unknown_names(app, argc, argv);
     return parse(app, argc, argv);
   } catch (const std::invalid_argument& error) {
-    return fail(error.what(), exit_usage);
+    const std::string misuse = word_in_place_of_a_file(app, argc, argv);
+    return fail(misuse.empty() ? error.what() : misuse, exit_usage);
   } catch (const ThousandsError& error) {
     const auto can = [command = app.get_subcommands().front()](const char* option) {
       return command->get_option_no_throw(option) != nullptr;
@@ -180,7 +181,8 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
                               : fmt::format("{}: there is not enough memory for this", fmt::join(files, ", ")),
                 exit_refused);
   } catch (const std::exception& error) {
-    return fail(error.what(), exit_refused);
+    const std::string misuse = word_in_place_of_a_file(app, argc, argv);
+    return misuse.empty() ? fail(error.what(), exit_refused) : fail(misuse, exit_usage);
   }
 }
 

@@ -4,9 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -169,13 +171,14 @@ void refuse_unknown_names(const CLI::App& program, int argc, const char* const* 
   }
 }
 
-std::string hint_on_extra_argument(const CLI::App& program, int argc, const char* const* argv) {
+namespace {
+
+// Why a word may stand where it was not expected; empty: not known.
+std::string reason_of(const CLI::App& program, const std::string& extra, int argc, const char* const* argv) {
   const std::vector<CLI::App*> chosen = program.get_subcommands();
-  if (chosen.empty()) return {};
-  const std::vector<std::string> extra = chosen.back()->remaining();
   const auto* const end = argv + argc;
   for (const auto* word = argv + 1; word != end; ++word) {
-    if (extra.empty() || extra.front() != *word) continue;
+    if (extra != *word) continue;
     const auto* before = word;
     while (before != argv && !std::string_view(*before).starts_with("-")) --before;
     const CLI::Option* const option = chosen.back()->get_option_no_throw(*before);
@@ -193,7 +196,32 @@ std::string hint_on_extra_argument(const CLI::App& program, int argc, const char
       return fmt::format("; several names are separated by commas: {} {},{}", *before, *(before + 1), *(before + 2));
     }
   }
-  return usage_of(program);
+  return {};
+}
+
+}  // namespace
+
+std::string hint_on_extra_argument(const CLI::App& program, int argc, const char* const* argv) {
+  const std::vector<CLI::App*> chosen = program.get_subcommands();
+  if (chosen.empty()) return {};
+  const std::vector<std::string> extra = chosen.back()->remaining();
+  const std::string reason = extra.empty() ? "" : reason_of(program, extra.front(), argc, argv);
+  return reason.empty() ? usage_of(program) : reason;
+}
+
+std::string word_in_place_of_a_file(const CLI::App& program, int argc, const char* const* argv) {
+  const std::vector<CLI::App*> chosen = program.get_subcommands();
+  if (chosen.empty()) return {};
+  for (const CLI::Option* option : chosen.back()->get_options()) {
+    if (option->nonpositional()) continue;
+    for (const std::string& word : option->results()) {
+      std::error_code ignored;
+      if (std::filesystem::exists(word, ignored)) continue;
+      const std::string reason = reason_of(program, word, argc, argv);
+      if (!reason.empty()) return fmt::format("The following argument was not expected: {}{}", word, reason);
+    }
+  }
+  return {};
 }
 
 std::string usage_of(const CLI::App& program) {

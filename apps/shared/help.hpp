@@ -30,6 +30,10 @@ void refuse_unknown_names(const CLI::App& program, int argc, const char* const* 
 /// of them follows an option with a list. Else empty.
 std::string hint_on_extra_argument(const CLI::App& program, int argc, const char* const* argv);
 
+/// What to say in the place of an error where a word after an option was taken for a file: "The following argument was
+/// not expected: 5; a value of --readable is written --readable=5". Empty: all files exist, or none is such a word.
+std::string word_in_place_of_a_file(const CLI::App& program, int argc, const char* const* argv);
+
 /// "; usage: llmt fit [OPTIONS] data" of the command that was chosen; empty if it takes no file.
 std::string usage_of(const CLI::App& program);
 

@@ -70,8 +70,8 @@ TEST(Words, ModelAndTableThatWereExchangedAreNamed) {
   for (const std::string command : {"fit m.json -t y", "predict m.json m.json", "compare m.json -t y"}) {
     EXPECT_EQ(refused_text(folder, command, 1), "llmt: m.json: this is a JSON file; a table (CSV) is expected\n");
   }
-  EXPECT_EQ(refused_text(folder, "predict m.json d.csv d.csv", 2),
-            "llmt: The following argument was not expected: d.csv; usage: llmt predict [OPTIONS] model data\n");
+  EXPECT_EQ(refused_text(folder, "inspect m.json d.csv", 2),
+            "llmt: The following argument was not expected: d.csv; usage: llmt inspect [OPTIONS] model\n");
 }
 
 TEST(Words, AHeaderOfNumbersIsTakenForARowAndSaid) {
