@@ -212,6 +212,14 @@ std::string hint_on_extra_argument(const CLI::App& program, int argc, const char
 std::string word_in_place_of_a_file(const CLI::App& program, int argc, const char* const* argv) {
   const std::vector<CLI::App*> chosen = program.get_subcommands();
   if (chosen.empty()) return {};
+  std::size_t given = 0;
+  std::size_t needed = 0;
+  for (const CLI::Option* option : chosen.back()->get_options()) {
+    if (option->nonpositional()) continue;
+    given += option->count();
+    needed += option->get_required() ? 1 : 0;
+  }
+  if (given <= needed) return {};  // no word too many: a file is missing
   for (const CLI::Option* option : chosen.back()->get_options()) {
     if (option->nonpositional()) continue;
     for (const std::string& word : option->results()) {

@@ -80,6 +80,7 @@ TEST(Arguments, OptionsMayStandBeforeTheFile) {
   folder.write("d.csv", small_table());
   EXPECT_EQ(folder.run(llmt_program + " fit --target y --ignore x,x d.csv").exit_code, 2);  // x twice
   EXPECT_EQ(folder.run(llmt_program + " fit --inputs x --target y d.csv").exit_code, 0);
+  EXPECT_NE(folder.run(llmt_program + " fit -t y --inputs x none.csv").err.find("none.csv: "), std::string::npos);
   EXPECT_EQ(refusal(folder, "fit -t y --inputs x z d.csv"),
             "llmt: The following argument was not expected: z; several names are separated by commas: --inputs "
             "x,z\n");
