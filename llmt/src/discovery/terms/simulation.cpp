@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "discovery/terms/alternatives.hpp"
+#include "discovery/terms/averaged_rows.hpp"
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/determined.hpp"
 #include "discovery/terms/motion.hpp"
@@ -271,6 +273,15 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   return missing;
 }
 
+// Of a log with more rows than a search can use, means over few rows are searched.
+Missing find_in_rows(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                     const std::vector<ModelTerm>& terms, const MissingOptions& options) {
+  const std::optional<AveragedRows> few = averaged(inputs, measured, options);
+  if (!few) return find(simulation, inputs, measured, terms, options);
+  return of_all_rows(find(averaged(simulation, inputs, few->blocks), few->inputs, few->measured, terms, options), *few,
+                     simulation, terms, inputs);
+}
+
 // Whether what is left is alike in neighbouring rows.
 bool is_alike_in_neighbours(const MeasuredOutputs& measured, const Missing& missing) {
   constexpr double alike = 0.6;  // independent share
@@ -293,13 +304,13 @@ Missing find_along_rows(const Simulation& simulation, const Inputs& inputs, cons
   const AlongRows rows = is_told ? AlongRows::independent : along_rows(inputs, options);
   Missing missing;
   if (rows != AlongRows::measured_signal) {
-    missing = find(simulation, inputs, measured, terms, options);
+    missing = find_in_rows(simulation, inputs, measured, terms, options);
     if (rows == AlongRows::independent || !is_alike_in_neighbours(measured, missing)) return missing;
   }
   Inputs in_time = inputs;
   in_time.instants =
       Eigen::VectorXd::LinSpaced(inputs.values.rows(), 0.0, static_cast<double>(inputs.values.rows() - 1));
-  missing = find(simulation, in_time, measured, terms, options);
+  missing = find_in_rows(simulation, in_time, measured, terms, options);
   missing.time.found_out = true;
   return missing;
 }
