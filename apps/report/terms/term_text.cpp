@@ -104,6 +104,12 @@ std::string headline(const discovery::Missing& missing) {
     case discovery::Answer::indistinguishable:
       return terms + " missing, but other terms explain it as well";
     case discovery::Answer::unknown:
+      if (is_drift(missing)) {
+        return fmt::format(
+            "these rows cannot tell what is missing: what is left changes so slowly that they hold {:.1f} "
+            "independent values of it",
+            missing.time.independent_share * static_cast<double>(missing.time.samples));
+      }
       return sure == 0 ? "something is missing that no term tried explains"
                        : fmt::format("{} missing, and something more that no term tried explains",
                                      sure == 1 ? "one term is" : fmt::format("{} terms are", sure));

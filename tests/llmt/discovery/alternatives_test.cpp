@@ -47,10 +47,12 @@ Missing answer_of(const Log& log, const std::string& family, double after) {
   found.generic = log.terms.at(found.term).generic;
   found.coefficients = Eigen::VectorXd::Ones(1);
   found.constants = Eigen::VectorXd::Ones(std::ssize(log.terms[found.term].constants));
+  found.confirmed = true;
   Missing missing;
   missing.answer = Answer::named;
   missing.found = {found};
   missing.held_out = {0};
+  missing.corrected = Eigen::MatrixXd::Constant(rows, 1, 1e3);  // far off, where it is not said otherwise
   missing.gaps = {{.output = "y", .before = log.spread(), .after = after, .noise_floor = noise}};
   return missing;
 }
@@ -78,7 +80,8 @@ TEST(Alternatives, PlainTermsAreTakenWhereTheyLeaveClearlyLessOrNoMoreWithFewerN
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     const Log log(seed);
     constexpr Search plain = Search::plain_for_searched;
-    const double left = taken(log, answer_of(log, "saturation", 2.0 * noise), plain).gaps[0].after;  // by the square
+    const Missing of_square = taken(log, answer_of(log, "saturation", 2.0 * noise), plain);
+    const double left = of_square.gaps[0].after;
     EXPECT_LT(left, 1.3 * noise);
     // 70 and 90 % of the squares.
     Missing clearly_more = answer_of(log, "saturation", left / std::sqrt(0.7));
@@ -91,6 +94,14 @@ TEST(Alternatives, PlainTermsAreTakenWhereTheyLeaveClearlyLessOrNoMoreWithFewerN
     for (Missing* missing : {&clearly_more, &more}) missing->found[0].coefficients.resize(0);
     EXPECT_EQ(family_taken(log, clearly_more, plain), "square");
     EXPECT_EQ(family_taken(log, more, plain), "saturation");
+    // As good on the rows that both set aside: a rival.
+    Missing as_good = answer_of(log, "saturation", 0.95 * left);
+    as_good.held_out = of_square.held_out;
+    as_good.corrected = of_square.corrected;
+    const Missing doubted = taken(log, as_good, plain);
+    ASSERT_EQ(doubted.found[0].rivals.size(), 1u);
+    EXPECT_EQ(doubted.found[0].rivals[0].what, "square x");
+    EXPECT_EQ(doubted.answer, Answer::indistinguishable);
   }
 }
 

@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "discovery/search/replacements.hpp"
 #include "discovery/terms/alternatives.hpp"
+#include "discovery/terms/approximations.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "search_cases.hpp"
 
@@ -41,6 +43,7 @@ TEST(Answers, AnOffsetBesideAPowerIsTentativeWhereAFunctionOfTheInputCouldStandF
     Missing missing = answer_with({found_term(0, "cube", "T", 1.0, 0.01), found_term(1, "offset", "", -3.0, 0.1)});
     missing.found[1].rivals = std::move(rivals);
     decide(missing, true);
+    for (const std::string& note : missing.notes) EXPECT_NE(note.find("of T: together"), std::string::npos) << note;
     return missing.found[0].confirmed && missing.found[1].confirmed;
   };
   EXPECT_TRUE(power_and_offset({}));
@@ -69,6 +72,43 @@ TEST(Answers, ATermIsTentativeIfTheIntervalOfItsCoefficientReachesZero) {
   };
   EXPECT_TRUE(is_confirmed(0.5));
   EXPECT_FALSE(is_confirmed(0.52));
+}
+
+TEST(Answers, TermsOfOneInputThatNearlyCancelAreTentative) {
+  const auto is_confirmed = [](bool cancels) {
+    Missing missing = answer_with({found_term(0, "sign", "v", 1.3, 0.01), found_term(1, "tanh", "v", -1.3, 0.01)});
+    decide(missing, true, {cancels, cancels});
+    EXPECT_EQ(missing.notes.empty(), missing.found[0].confirmed);
+    return missing.found[0].confirmed && missing.found[1].confirmed;
+  };
+  EXPECT_TRUE(is_confirmed(false));
+  EXPECT_FALSE(is_confirmed(true));
+}
+
+TEST(Answers, ASignAndATanhOfTheOtherSignNearlyCancel) {
+  constexpr Eigen::Index n = 201;
+  const Inputs inputs{{"v"}, Eigen::VectorXd::LinSpaced(n, -1.0, 1.0)};
+  const Simulation simulation = tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"});
+  const std::vector<ModelTerm> terms = standard_terms(inputs);
+  const TermModel model(simulation, inputs, {"y"}, terms);
+  Samples samples;
+  for (Eigen::Index i = 0; i < n; ++i) samples.add(std::span(&i, 1));
+  const TermData data{
+      .samples = samples, .measured = Eigen::MatrixXd::Zero(n, 1), .sigma = Eigen::VectorXd::Ones(1), .stretches = {}};
+  const auto placed = [&](const std::string& family, double value, double width) {
+    const auto own = std::ranges::find(terms, family, &ModelTerm::family) - terms.begin();
+    FoundTerm term = found_term(static_cast<std::size_t>(own), family, "v", value, 0.01);
+    term.constants = Eigen::VectorXd::Constant(std::ssize(terms[own].constants), width);
+    return term;
+  };
+  const Eigen::VectorXd nominal = Eigen::Vector2d(0.0, 1.0);
+  const auto cancels = [&](const std::vector<FoundTerm>& found) {
+    return cancelling_terms(model, data, nominal, found);
+  };
+  // 1 - tanh(v / 0.1) has a mean square of about 0.04, 1 + tanh(v / 0.1) one of nearly 4.
+  EXPECT_EQ(cancels({placed("sign", 1.0, 0.0), placed("tanh", -1.0, 0.1)}), (std::vector<bool>{true, true}));
+  EXPECT_EQ(cancels({placed("sign", 1.0, 0.0), placed("tanh", 1.0, 0.1)}), (std::vector<bool>{false, false}));
+  EXPECT_EQ(cancels({placed("tanh", 1.0, 0.1)}), (std::vector<bool>{false}));
 }
 
 TEST(Answers, AWidthIsNotBelowTheErrorsOfItsInput) {
@@ -114,6 +154,7 @@ Missing leaving(double error, std::vector<FoundTerm> found) {
   missing.corrected = Eigen::MatrixXd::Constant(100, 1, -error);
   for (Eigen::Index row = 0; row < 50; ++row) missing.held_out.push_back(row);
   missing.gaps = {{.output = "y", .before = 10.0, .after = error, .noise_floor = 1.0}};
+  for (FoundTerm& term : missing.found) term.confirmed = true;
   return missing;
 }
 
@@ -137,7 +178,10 @@ TEST(Answers, TermsOfInputsThatLeaveAsLittleAreRivalsOfAGain) {
   EXPECT_EQ(inputs_for_gain(found, leaving(1.2, {inertia}), measured, 6.0).found[0].family, "gain");
   Missing uncertain = leaving(1.1, {inertia});
   uncertain.answer = Answer::unknown;
-  EXPECT_EQ(inputs_for_gain(found, uncertain, measured, 6.0).found[0].family, "gain");
+  const Missing doubted = inputs_for_gain(found, uncertain, measured, 6.0);
+  EXPECT_EQ(doubted.found[0].family, "gain");
+  EXPECT_FALSE(doubted.found[0].confirmed);
+  EXPECT_EQ(doubted.answer, Answer::unknown);
   EXPECT_TRUE(has_gain(answer_with({found_term(0, "load_friction", "v", 0.2, 0.01)})));
   EXPECT_FALSE(has_gain(answer_with({drag})));
 }

@@ -153,6 +153,19 @@ TEST(InTime, CorrelatedNoiseIsNoMissingTerm) {
   EXPECT_LE(alarms, 1);
 }
 
+// What drifts along the whole log says little of terms, and is not "nothing" either.
+TEST(InTime, ADriftIsNotNothing) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    MassLog log = log_of(seed, 1000, 0.05, 0.0, nothing);
+    EXPECT_FALSE(is_drift(missing_from(log)));
+    log.measured.values.array() -= 0.5 * (1.0 - (-log.inputs.instants.array() / 10.0).exp());  // 10 of 20 s
+    const Missing missing = missing_from(log);
+    EXPECT_EQ(missing.answer, Answer::unknown);
+    EXPECT_TRUE(is_drift(missing));
+    EXPECT_FALSE(missing.notes.empty());
+  }
+}
+
 TEST(InTime, StandardErrorsHoldUnderCorrelatedNoise) {
   int named = 0;
   int covered = 0;

@@ -136,11 +136,10 @@ struct VisibleTerm {
 
 /// Outcome of find_missing().
 struct Missing {
-  /// As Verdict::answer; but unknown if material structure is left although nothing was found, and if not every term
-  /// found is confirmed: what those stand for has no name yet. Failed_held_out if what was found makes the error on the
-  /// samples set aside larger, and parameters_only if nothing was found and the parameters improve the score, see
-  /// find_missing(). Inner_state if one of the named terms stands for a state that the inputs do
-  /// not show.
+  /// As Verdict::answer; but unknown if material structure is left although nothing was found, if is_drift(), and if
+  /// not every term found is confirmed: what those stand for has no name yet. Failed_held_out if what was found makes
+  /// the error on the samples set aside larger, and parameters_only if nothing was found and the parameters improve the
+  /// score, see find_missing(). Inner_state if one of the named terms stands for a state that the inputs do not show.
   Answer answer = Answer::nothing_missing;
   Verdict verdict;  ///< of the last search; candidates in it are numbers of `candidates`, samples those of `searched`
   std::vector<std::string> candidates;
@@ -169,6 +168,10 @@ struct Missing {
   std::vector<Eigen::Index> failing_rows;  ///< set aside, where the terms make the error grow most; if that failed
   int rounds = 0;
 };
+
+/// Whether nothing was found in rows in time, and what is left changes so slowly that they hold fewer than 10 values
+/// of it that are independent. A term could not be told from a drift.
+bool is_drift(const Missing& missing);
 
 /// Whether what was found is not to be added: it failed on the rows set aside, or the sum of Gap::after^2 / before^2
 /// over the outputs is larger than their number, as where a term makes errors of the inputs larger than what it

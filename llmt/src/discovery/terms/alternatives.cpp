@@ -62,6 +62,35 @@ double evidence_against(const Missing& other, const Missing& found, const Measur
   return evidence;
 }
 
+// Those terms of `other` that are not among `beside`, on the output of `term`.
+RivalTerms in_its_place(const FoundTerm& term, const std::vector<FoundTerm>& beside, const Missing& other) {
+  RivalTerms rival;
+  for (const FoundTerm& instead : other.found) {
+    const bool is_shared = std::ranges::any_of(beside, [&](const FoundTerm& own) {
+      return own.term == instead.term && own.output_index == instead.output_index;
+    });
+    if (is_shared || instead.output_index != term.output_index) continue;
+    rival.what +=
+        (rival.what.empty() ? "" : " + ") + instead.family + (instead.location.empty() ? "" : " " + instead.location);
+    rival.inputs.insert(rival.inputs.end(), instead.inputs.begin(), instead.inputs.end());
+  }
+  return rival;
+}
+
+// Terms with a constant, of `place`, for which those of `plain` could stand. If these are approximations, so may they
+// be.
+void doubt_searched(const std::vector<std::string>& place, const Missing& plain, bool holds, Missing& found) {
+  for (FoundTerm& term : found.found) {
+    if (term.inputs != place || term.constants.size() == 0 || term.generic) continue;
+    const RivalTerms rival = in_its_place(term, found.found, plain);
+    if (rival.what.empty()) continue;
+    term.rivals.insert(term.rivals.begin(), rival);
+    if (found.answer == Answer::named) found.answer = Answer::indistinguishable;
+    if (!holds) term.confirmed = false;
+  }
+  demand_certainty(found);
+}
+
 }  // namespace
 
 bool has_gain(const Missing& missing) { return std::ranges::any_of(missing.found, is_gain); }
@@ -85,20 +114,13 @@ Missing inputs_for_gain(Missing found, Missing of_inputs, const MeasuredOutputs&
   const std::vector<FoundTerm> beside = found.found;
   for (FoundTerm& gain : found.found) {
     if (!is_gain(gain)) continue;
-    RivalTerms rival;
-    for (const FoundTerm& term : of_inputs.found) {
-      const bool is_shared = std::ranges::any_of(beside, [&](const FoundTerm& other) {
-        return other.term == term.term && other.output_index == term.output_index;
-      });
-      if (is_shared || term.output_index != gain.output_index) continue;
-      rival.what +=
-          (rival.what.empty() ? "" : " + ") + term.family + (term.location.empty() ? "" : " " + term.location);
-      rival.inputs.insert(rival.inputs.end(), term.inputs.begin(), term.inputs.end());
-    }
+    const RivalTerms rival = in_its_place(gain, beside, of_inputs);
     if (rival.what.empty()) continue;
     gain.rivals.insert(gain.rivals.begin(), rival);
     if (found.answer == Answer::named) found.answer = Answer::indistinguishable;
+    if (!is_certain) gain.confirmed = false;
   }
+  demand_certainty(found);
   return found;
 }
 
@@ -157,7 +179,11 @@ Missing Alternatives::plain_for_searched(Missing found) const {
     const double ratio = left_on_held_out(plain, found) / left_on_held_out(found, found);
     const bool holds = std::ranges::all_of(plain.found, &FoundTerm::confirmed);
     const bool has_fewer = fitted_numbers(plain) < fitted_numbers(found);
-    if ((holds && ratio < clearly_less) || (has_fewer && ratio < 1.0)) found = std::move(plain);
+    if ((holds && ratio < clearly_less) || (has_fewer && ratio < 1.0)) {
+      found = std::move(plain);
+    } else if (evidence_against(plain, found, *measured_) <= options_->search.rival_margin) {
+      doubt_searched(place, plain, holds, found);
+    }
   }
   return found;
 }

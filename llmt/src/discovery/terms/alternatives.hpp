@@ -40,7 +40,8 @@ class Alternatives {
 
   /// What a term with a constant misses makes neighbours alike, so that few samples count and two plain terms in its
   /// place do not seem to be worth their cost. Where terms without constants leave clearly less, or no more with fewer
-  /// fitted numbers, they are the answer.
+  /// fitted numbers, they are the answer. Where they do as well by the margin of a rival, they are one of the term; it
+  /// is tentative if they are, because then it may be an approximation too.
   Missing plain_for_searched(Missing found) const;
 
  private:
@@ -65,7 +66,7 @@ std::set<std::size_t> shares_of_the_simulation(const std::vector<ModelTerm>& ter
 /// Changes of an inertia and of friction together change the output by almost a share of it, and so do changes of all
 /// free parameters. `of_inputs` is the answer without shares. Where it explains as well on the rows set aside, by the
 /// margin of a rival: if it has fewer terms, it is the answer, and otherwise those that stand in the place of a gain
-/// become a rival of it.
+/// become a rival of it, which is tentative if they are.
 Missing inputs_for_gain(Missing found, Missing of_inputs, const MeasuredOutputs& measured, double rival_margin);
 
 }  // namespace llmt::discovery

@@ -79,8 +79,9 @@ void find_derivatives_of_outputs(const Derivatives& derivatives, const Inputs& i
     if (found.generic || found.inputs.size() != 1) continue;
     const auto place = std::ranges::find(inputs.names, found.inputs.front()) - inputs.names.begin();
     if (!is_derivative_of(derivatives, inputs.values.col(place), measured.values.col(found.output_index))) continue;
-    found.inner_state = "a state behind the output, which depends on its own derivative " + found.inputs.front();
-    found.shown_by = "a signal measured behind the drive";
+    found.inner_state = "the output depends on its own derivative " + found.inputs.front() +
+                        ", as with a delay, clocks that differ, or a spring or damper behind it";
+    found.shown_by = "a signal measured behind it, or a step on the clocks of all signals";
   }
 }
 

@@ -4,11 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <set>
 
+#include "discovery/terms/approximations.hpp"
 #include "discovery/terms/input_noise.hpp"
 #include "discovery/terms/structure.hpp"
 
@@ -49,64 +48,6 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
         {term.constants[c].name, term.constants[c].unit, placed.constants(c), errors(placed.coefficients.size() + c)});
   }
   return found;
-}
-
-std::vector<std::string> sorted_inputs(const FoundTerm& found) {
-  std::vector<std::string> inputs = found.inputs;
-  std::ranges::sort(inputs);
-  return inputs;
-}
-
-// Coulomb and viscous friction are one law of a speed.
-std::string kind_of(const FoundTerm& found) {
-  return found.family == "sign" || found.family == "linear" ? "dry and viscous" : found.family;
-}
-
-bool has_rival_of(const FoundTerm& found, const std::string& input) {
-  return std::ranges::any_of(found.rivals, [&](const RivalTerms& rival) {
-    return std::ranges::find(rival.inputs, input) != rival.inputs.end();
-  });
-}
-
-// Inputs and output of a term. One for which an offset could stand is, in time, also where a function of one input
-// would explain as well in its place.
-using Place = std::pair<std::vector<std::string>, Eigen::Index>;
-std::vector<Place> places_of(const FoundTerm& found, bool in_time) {
-  constexpr std::size_t most_inputs = 2;
-  std::vector<Place> places;
-  if (!found.inputs.empty() && found.inputs.size() <= most_inputs) {
-    places.emplace_back(sorted_inputs(found), found.output_index);
-  }
-  const bool is_like_an_offset =
-      found.inputs.empty() || std::ranges::any_of(found.rivals, [](const RivalTerms& r) { return r.what == "offset"; });
-  for (const RivalTerms& rival : found.rivals) {
-    if (in_time && is_like_an_offset && rival.inputs.size() == 1) places.emplace_back(rival.inputs, found.output_index);
-  }
-  return places;
-}
-
-// Terms that together may only approximate another function: three or more kinds of one input (in time, two of which
-// one has a rival of that input), or two terms of the same two inputs.
-std::vector<bool> approximations(const std::vector<FoundTerm>& all, bool in_time) {
-  // Terms of one input are counted by kinds, as there may be several steps. A product and a square times the other
-  // input are as much of a power series in two inputs as the terms have.
-  constexpr std::array<std::size_t, 2> too_many = {3, 2};
-  std::map<Place, std::set<std::string>> kinds;
-  std::set<Place> uncertain;
-  for (const FoundTerm& found : all) {
-    for (const Place& place : places_of(found, in_time)) {
-      const std::vector<std::string>& inputs = place.first;
-      if (in_time && inputs.size() == 1 && has_rival_of(found, inputs.front())) uncertain.insert(place);
-      kinds[place].insert(inputs.size() == 1 ? kind_of(found) : found.family + " " + found.location);
-    }
-  }
-  std::vector<bool> approximate;
-  for (const FoundTerm& found : all) {
-    approximate.push_back(std::ranges::any_of(places_of(found, in_time), [&](const Place& place) {
-      return kinds[place].size() + (uncertain.contains(place) ? 1 : 0) >= too_many[place.first.size() - 1];
-    }));
-  }
-  return approximate;
 }
 
 // The coefficient whose interval of 95 % reaches zero or, of a term with a constant, farther than a quarter of it; -1:
@@ -209,7 +150,7 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
   return all;
 }
 
-void decide(Missing& missing, bool in_time) {
+void decide(Missing& missing, bool in_time, const std::vector<bool>& cancelling) {
   const bool is_nothing = missing.verdict.answer == Answer::nothing_missing;
   missing.answer = is_nothing && !missing.structure.empty() ? Answer::unknown : missing.verdict.answer;
   constexpr double certain = 2.0;  // standard errors
@@ -228,10 +169,11 @@ void decide(Missing& missing, bool in_time) {
   std::set<std::vector<std::string>> noted;
   for (std::size_t k = 0; k < missing.found.size(); ++k) {
     FoundTerm& found = missing.found[k];
+    const bool cancels = !cancelling.empty() && cancelling[k];
     const bool is_beside_structure =
         std::ranges::find(missing.structure, found.output, &Structure::output) != missing.structure.end();
     found.confirmed = missing.answer != Answer::failed_held_out && missing.verdict.answer != Answer::unknown &&
-                      !found.generic && !approximate[k] && !is_beside_structure && found.shrinks_gap &&
+                      !found.generic && !approximate[k] && !cancels && !is_beside_structure && found.shrinks_gap &&
                       found.hangs_on.empty();
     // What stands beside a state, and explains less, may be what the state does beyond its model.
     if (found.inner_state.empty() && found.share < share_of_state) found.confirmed = false;
@@ -246,10 +188,11 @@ void decide(Missing& missing, bool in_time) {
                       own.name, found.location.empty() ? found.family : found.family + " " + found.location, own.value,
                       own.standard_error, found.constants.size() > 0 ? " to a quarter" : ""));
     }
-    if (!approximate[k] || !noted.insert(sorted_inputs(found)).second) continue;
+    if (!(approximate[k] || cancels) || found.inputs.empty() || !noted.insert(sorted_inputs(found)).second) continue;
+    const std::string inputs = fmt::format("{}", fmt::join(sorted_inputs(found), " and "));
     missing.notes.push_back(
-        fmt::format("there are many terms of {}: together they may approximate one that was not tried",
-                    fmt::join(sorted_inputs(found), " and ")));
+        (approximate[k] ? "there are many terms of " + inputs : "the terms of " + inputs + " nearly cancel") +
+        ": together they may approximate one that was not tried");
   }
 }
 
@@ -291,6 +234,12 @@ std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::ve
     if (std::abs(found.constants(0)) < least) narrow.insert(found.term);
   }
   return narrow;
+}
+
+bool is_drift(const Missing& missing) {
+  constexpr double fewest = 10.0;
+  return missing.time.in_time && missing.found.empty() &&
+         missing.time.independent_share * static_cast<double>(missing.time.samples) < fewest;
 }
 
 bool is_worse(const Missing& missing) {

@@ -38,7 +38,8 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 /// - a term is confirmed if it is a cause, the search found no shapes, no structure is left in its output, and it is
 ///   not one of many terms of its inputs, which together may only approximate another function, and it shrinks the
 ///   error on the samples set aside.
-void decide(Missing& missing, bool in_time);
+/// `cancelling`: of each term found, whether it nearly cancels others; empty: none.
+void decide(Missing& missing, bool in_time, const std::vector<bool>& cancelling = {});
 
 /// What is named is certain: with a term that is not confirmed the answer is "unknown".
 void demand_certainty(Missing& missing);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "discovery/terms/approximations.hpp"
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/errors_of_inputs.hpp"
 #include "discovery/terms/fitted_parameters.hpp"
@@ -117,7 +118,8 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   judge_held_out(model, kept, aside, baseline, settled, in_time ? errors.noise.get() : nullptr, missing);
   if (in_time) judge_in_time(model, kept, inputs, measured, settled, missing);
   missing.notes.insert(missing.notes.end(), errors.notes.begin(), errors.notes.end());
-  decide(missing, in_time);
+  decide(missing, in_time,
+         in_time ? cancelling_terms(model, kept, settled.fit.parameters, missing.found) : std::vector<bool>{});
   doubt_uncorrected(errors, missing);
   demand_certainty(missing);
   describe_parameters({model, kept, start, baseline, settled.fit}, sums, options.search.false_alarm_rate, missing);
@@ -137,6 +139,13 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
                     .step = split.step,
                     .independent_share = data.independent_share,
                     .correlation_time = correlation_time(split, measured.values - missing.corrected)};
+  }
+  if (missing.answer == Answer::nothing_missing && is_drift(missing)) {
+    missing.answer = Answer::unknown;
+    missing.visible.clear();  // beside a drift no term could be seen
+    missing.notes.emplace_back(
+        "what is left may be a drift, a term that was not tried, or one that varies as slowly: record longer, or with "
+        "more changes of the inputs");
   }
   if (missing.answer != Answer::failed_held_out && is_worse(missing)) {
     missing.notes.emplace_back(
