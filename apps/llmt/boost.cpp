@@ -15,9 +15,9 @@ namespace llmt::apps {
 namespace {
 
 void refuse_options_of_one_tree(const CLI::App& command) {
-  constexpr std::array<std::string_view, 12> taken = {"data",          "target",    "inputs", "ignore",
-                                                      "categorical",   "weight",    "output", "json",
-                                                      "decimal-comma", "thousands", "boost",  "threads"};
+  constexpr std::array<std::string_view, 13> taken = {"data",   "target",  "inputs", "ignore",        "categorical",
+                                                      "weight", "output",  "json",   "decimal-comma", "thousands",
+                                                      "boost",  "threads", "seed"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_single_name();
     if (option->count() > 0 && std::ranges::find(taken, name) == taken.end()) {
@@ -36,7 +36,7 @@ void boost_command(const CLI::App& command, const BoostArguments& arguments) {
         fmt::format("{}: {} row{}; --boost needs at least {} that differ, llmt fit without --boost takes fewer",
                     table_name(arguments.learning.data), rows, rows == 1 ? "" : "s", fewest_boosted_rows));
   }
-  const BoostOptions options{.max_threads = table.options.max_threads};
+  const BoostOptions options{.seed = table.options.folds.seed, .max_threads = table.options.max_threads};
   ProgressBar bar("boosting");
   const BoostResult result = fit_boosted(*table.data, options, bar.callback());
   bar.clear();

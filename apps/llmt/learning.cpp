@@ -264,7 +264,8 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   expert(command.add_flag_callback(
       "--prune", [&options] { options.pruning = Pruning::weakest_link; },
       "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better"));
-  expert(add_seed(command, options.folds.seed, "Of the random folds"));
+  expert(add_seed(command, options.folds.seed,
+                  "Of the random folds; with --boost, of the held-out rows and of the features looked at"));
 }
 
 }  // namespace llmt::apps

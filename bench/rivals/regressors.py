@@ -1,6 +1,6 @@
-"""The regressors that run.py compares: name -> (package, function that makes one).
+"""The regressors that run.py compares: name -> (package, function that makes one of a seed: 0, 1, ...).
 
-All have the defaults of their package, except for one thread, seed 0 where there is a seed, and silence; what else a
+All have the defaults of their package, except for one thread, the seed where there is one, and silence; what else a
 row sets is in its name. requirements.txt has the packages. M5P is a program of Weka, which Debian packages.
 """
 import json
@@ -45,9 +45,9 @@ class Program:
 class Llmt(Program):
     program = "llmt"
 
-    def __init__(self, *options):
+    def __init__(self, seed, *options):
         super().__init__()
-        self.options = options
+        self.options = ["--seed", str(seed + 1), *options]  # 1 is the default
 
     def write(self, name, x, y=None):
         columns = [f"x{j}" for j in range(x.shape[1])] + ([] if y is None else ["y"])
@@ -91,29 +91,30 @@ class M5P(Program):
 
 REGRESSORS = {
     "llmt": (None, Llmt),
-    "llmt (boost)": (None, lambda: Llmt("--boost")),
-    "llmt (crisp)": (None, lambda: Llmt("--validity", "crisp")),
-    "ChimeraBoost": ("chimeraboost", lambda: ChimeraBoostRegressor(thread_count=1, random_state=0)),
-    "CatBoost": ("catboost", lambda: CatBoostRegressor(
-        thread_count=1, random_seed=0, verbose=0, allow_writing_files=False)),
-    "LightGBM": ("lightgbm", lambda: LGBMRegressor(n_jobs=1, random_state=0, verbose=-1)),
-    "LightGBM (300 rounds)": ("lightgbm", lambda: LGBMRegressor(
-        n_jobs=1, random_state=0, verbose=-1, n_estimators=300)),
-    "LightGBM (linear_tree)": ("lightgbm", lambda: LGBMRegressor(
-        n_jobs=1, random_state=0, verbose=-1, linear_tree=True)),
-    "XGBoost": ("xgboost", lambda: XGBRegressor(n_jobs=1, random_state=0)),
-    "XGBoost (300 rounds, rate 0.1)": ("xgboost", lambda: XGBRegressor(
-        n_jobs=1, random_state=0, n_estimators=300, learning_rate=0.1)),
-    "HistGradientBoosting": ("scikit-learn", lambda: HistGradientBoostingRegressor(random_state=0)),
-    "HistGradientBoosting (300 rounds)": ("scikit-learn", lambda: HistGradientBoostingRegressor(
-        random_state=0, max_iter=300, early_stopping=False)),
-    "EBM": ("interpret-core", lambda: ExplainableBoostingRegressor(n_jobs=1, random_state=0)),
-    "APLR": ("aplr", lambda: APLRRegressor(n_jobs=1, random_state=0)),
-    "Cubist": ("cubist", lambda: Cubist(random_state=0)),
-    "Cubist (20 committees, 5 neighbours)": ("cubist", lambda: Cubist(random_state=0, n_committees=20, neighbors=5)),
-    "pyoperon": ("pyoperon", lambda: SymbolicRegressor(n_threads=1, random_state=0)),
-    "least squares": ("scikit-learn", LinearRegression),
-    "M5P": (None, M5P),
+    "llmt (boost)": (None, lambda seed: Llmt(seed, "--boost")),
+    "llmt (crisp)": (None, lambda seed: Llmt(seed, "--validity", "crisp")),
+    "ChimeraBoost": ("chimeraboost", lambda seed: ChimeraBoostRegressor(thread_count=1, random_state=seed)),
+    "CatBoost": ("catboost", lambda seed: CatBoostRegressor(
+        thread_count=1, random_seed=seed, verbose=0, allow_writing_files=False)),
+    "LightGBM": ("lightgbm", lambda seed: LGBMRegressor(n_jobs=1, random_state=seed, verbose=-1)),
+    "LightGBM (300 rounds)": ("lightgbm", lambda seed: LGBMRegressor(
+        n_jobs=1, random_state=seed, verbose=-1, n_estimators=300)),
+    "LightGBM (linear_tree)": ("lightgbm", lambda seed: LGBMRegressor(
+        n_jobs=1, random_state=seed, verbose=-1, linear_tree=True)),
+    "XGBoost": ("xgboost", lambda seed: XGBRegressor(n_jobs=1, random_state=seed)),
+    "XGBoost (300 rounds, rate 0.1)": ("xgboost", lambda seed: XGBRegressor(
+        n_jobs=1, random_state=seed, n_estimators=300, learning_rate=0.1)),
+    "HistGradientBoosting": ("scikit-learn", lambda seed: HistGradientBoostingRegressor(random_state=seed)),
+    "HistGradientBoosting (300 rounds)": ("scikit-learn", lambda seed: HistGradientBoostingRegressor(
+        random_state=seed, max_iter=300, early_stopping=False)),
+    "EBM": ("interpret-core", lambda seed: ExplainableBoostingRegressor(n_jobs=1, random_state=seed)),
+    "APLR": ("aplr", lambda seed: APLRRegressor(n_jobs=1, random_state=seed)),
+    "Cubist": ("cubist", lambda seed: Cubist(random_state=seed)),
+    "Cubist (20 committees, 5 neighbours)": ("cubist", lambda seed: Cubist(
+        random_state=seed, n_committees=20, neighbors=5)),
+    "pyoperon": ("pyoperon", lambda seed: SymbolicRegressor(n_threads=1, random_state=seed)),
+    "least squares": ("scikit-learn", lambda seed: LinearRegression()),
+    "M5P": (None, lambda seed: M5P()),
 }
 # Fits or predictions that can take minutes, and the program that pip does not install.
 ONLY_WHEN_NAMED = ["EBM", "APLR", "Cubist (20 committees, 5 neighbours)", "pyoperon", "M5P"]

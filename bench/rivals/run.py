@@ -40,6 +40,7 @@ def arguments():
     parser.add_argument("--sets", metavar="FOLDER", type=pathlib.Path)
     parser.add_argument("--names", metavar="NAME,...", help="data sets of the folder; default: all")
     parser.add_argument("--splits", type=int, default=5, help="of each data set, from the first; default: %(default)s")
+    parser.add_argument("--seeds", type=int, default=1, help="of each fit, from 0; default: %(default)s")
     parser.add_argument("--rows", metavar="COUNT,...", help="training rows of the synthetic function")
     parser.add_argument("--only", metavar="NAME", action="append",
                         help="a regressor; may be repeated; default: those of regressors.py that take seconds")
@@ -90,7 +91,7 @@ def data_of_function(options):
     return [(SYNTHETIC + count, 0, lambda count=count: rows(int(float(count)))) for count in options.rows.split(",")]
 
 
-def work(make, data, seconds, sender):
+def work(make, seed, data, seconds, sender):
     """In the process of a fit: sends its result."""
     import numpy as np
 
@@ -98,7 +99,7 @@ def work(make, data, seconds, sender):
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     warnings.simplefilter("ignore")
     train_x, train_y, test_x, test_y = data
-    model = make()
+    model = make(seed)
     clock = getattr(model, "clock", resource.RUSAGE_SELF)
 
     def spent():
@@ -120,9 +121,9 @@ def work(make, data, seconds, sender):
         sender.send({"failed": f"{type(error).__name__}: {error}"})
 
 
-def fit(make, data, seconds):
+def fit(make, seed, data, seconds):
     receiver, sender = multiprocessing.Pipe(duplex=False)
-    process = multiprocessing.get_context("fork").Process(target=work, args=(make, data, seconds, sender))
+    process = multiprocessing.get_context("fork").Process(target=work, args=(make, seed, data, seconds, sender))
     process.start()
     sender.close()
     try:
@@ -134,9 +135,10 @@ def fit(make, data, seconds):
 
 
 def read_results(path):
-    """(data, split, regressor) -> the last line of it."""
+    """(data, split, seed, regressor) -> the last line of it."""
     lines = path.read_text().splitlines() if path.exists() else []
-    return {(line["data"], line["split"], line["regressor"]): line for line in map(json.loads, lines)}
+    return {(line["data"], line["split"], line.get("seed", 0), line["regressor"]): line
+            for line in map(json.loads, lines)}
 
 
 def measure(options):
@@ -161,13 +163,15 @@ def measure(options):
     options.results.parent.mkdir(exist_ok=True)
     data = (data_of_sets(options) if options.sets else []) + (data_of_function(options) if options.rows else [])
     for name, split, read in data:
-        missing = [one for one in names if done.get((name, split, one), {}).get("version") != versions[one]]
+        missing = [(seed, one) for seed in range(options.seeds) for one in names
+                   if done.get((name, split, seed, one), {}).get("version") != versions[one]]
         rows = read() if missing else None
-        for one in missing:
-            result = {"data": name, "split": split, "regressor": one, "version": versions[one], "rows": len(rows[1]),
-                      "inputs": rows[0].shape[1]} | fit(REGRESSORS[one][1], rows, options.seconds)
-            print(f"{name} {split} {one}: {result.get('failed') or '{rmse:.5g}, {fit_cpu:.3g} CPU s'.format(**result)}",
-                  file=sys.stderr)
+        for seed, one in missing:
+            result = {"data": name, "split": split, "seed": seed, "regressor": one, "version": versions[one],
+                      "rows": len(rows[1]), "inputs": rows[0].shape[1]}
+            result |= fit(REGRESSORS[one][1], seed, rows, options.seconds)
+            figures = result.get("failed") or "{rmse:.5g}, {fit_cpu:.3g} CPU s".format(**result)
+            print(f"{name}, split {split}, seed {seed}, {one}: {figures}", file=sys.stderr)
             with open(options.results, "a") as file:
                 file.write(json.dumps(result) + "\n")
 
@@ -177,22 +181,22 @@ def number(value):
 
 
 def summarise(results, base):
-    """data -> regressor -> splits, means over them, and the ratios to `base` on the same splits."""
+    """data -> regressor -> fits (split, seed), means over them, and the ratios to `base` in the same fits."""
     summary = {}
-    for (data, split, regressor), line in results.items():
+    for (data, split, seed, regressor), line in results.items():
         if "rmse" in line:
-            summary.setdefault(data, {}).setdefault(regressor, {})[split] = line
+            summary.setdefault(data, {}).setdefault(regressor, {})[split, seed] = line
     for rows in summary.values():
         own = rows.get(base, {})
         for regressor, lines in rows.items():
-            rows[regressor] = {"splits": sorted(lines)} | {
+            rows[regressor] = {"fits": sorted(lines)} | {
                 key: next(iter(lines.values()))[key] for key in ("version", "rows", "inputs")}
             for key in ("rmse", "fit_cpu", "leaves"):
                 if all(key in line for line in lines.values()):
                     rows[regressor][key] = statistics.mean(line[key] for line in lines.values())
-                if key != "leaves" and all(split in own for split in lines):
+                if key != "leaves" and all(one in own for one in lines):
                     rows[regressor][key + " ratio"] = rows[regressor][key] / statistics.mean(
-                        own[split][key] for split in lines)
+                        own[one][key] for one in lines)
     return summary
 
 
@@ -215,14 +219,14 @@ def print_readme(summary, sets):
 
 
 def print_sets(summary, sets, names):
-    all_splits = max(len(row["splits"]) for data in sets for row in summary[data].values())
+    most = max(len(row["fits"]) for data in sets for row in summary[data].values())
 
     def cell(row):
         if not row:
             return "–"
-        return number(row["rmse"]) + (f" ({len(row['splits'])})" if len(row["splits"]) < all_splits else "")
+        return number(row["rmse"]) + (f" ({len(row['fits'])})" if len(row["fits"]) < most else "")
 
-    print_markdown(f"Mean test RMSE over {all_splits} splits; in brackets: over fewer", ["", *sets],
+    print_markdown(f"Mean test RMSE over {most} fits (splits, seeds); in brackets: over fewer", ["", *sets],
                    [[name, *(cell(summary[data].get(name)) for data in sets)] for name in names])
 
 
@@ -242,10 +246,10 @@ def print_means(summary, sets, names, base):
         own = [summary[data][name] for data in sets if name in summary[data]]
         ranks = f"{statistics.mean(rank(data, name) for data in sets):.1f}" if name in ranked else "–"
         median = statistics.median(row["rmse ratio"] for row in own)
-        rows.append([name, own[0]["version"], f"{len(own)} x {len(own[0]['splits'])}", ranks, f"{median:.3f}",
+        rows.append([name, own[0]["version"], f"{len(own)} x {len(own[0]['fits'])}", ranks, f"{median:.3f}",
                      f"{mean(own, 'rmse ratio'):.3f}", f"{mean(own, 'fit_cpu ratio'):.2g}"])
     print_markdown(f"Over the sets: mean rank among {len(ranked)}; median and geometric mean of the ratios to {base}",
-                   ["", "version", "sets x splits", "mean rank", "RMSE, median", "RMSE, mean", "CPU, mean"], rows)
+                   ["", "version", "sets x fits", "mean rank", "RMSE, median", "RMSE, mean", "CPU, mean"], rows)
 
 
 def print_functions(summary, functions, names):
@@ -273,9 +277,9 @@ def print_tables(results, base):
         print_means(summary, sets, measured(sets), base)
     if functions:
         print_functions(summary, functions, measured(functions))
-    for (data, split, regressor), line in results.items():
+    for (data, split, seed, regressor), line in results.items():
         if "failed" in line:
-            print(f"\n{data}, split {split}, {regressor}: {line['failed']}")
+            print(f"\n{data}, split {split}, seed {seed}, {regressor}: {line['failed']}")
 
 
 def main():

@@ -57,6 +57,18 @@ TEST(BoostProgram, FitsAndPredictsAsTheLibrary) {
   EXPECT_EQ(answer.numbers("outside"), (Eigen::Vector3d{0.0, 1.0, 0.0}));
 }
 
+TEST(BoostProgram, TakesASeed) {
+  const Folder folder;
+  ASSERT_NO_FATAL_FAILURE(fit_sum(folder, 60));
+  for (const std::string seed : {"1", "2"}) {
+    const Outcome fitted = folder.run(LLMT_PROGRAM " fit d.csv -t y --boost --seed " + seed + " -o " + seed + ".json");
+    ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+  }
+  const auto model = [&](const char* name) { return to_json(llmt::load_boosted(folder.file(name))); };
+  EXPECT_EQ(model("1.json"), model("m.json"));
+  EXPECT_NE(model("2.json"), model("m.json"));
+}
+
 TEST(BoostProgram, RefusesByNameWhatIsForOneTree) {
   const Folder folder;
   ASSERT_NO_FATAL_FAILURE(fit_sum(folder, 60));

@@ -15,7 +15,9 @@ namespace {
 constexpr Eigen::Index enough_for_races = 5000;
 constexpr Eigen::Index enough_for_fast = 10000;
 constexpr int race_rounds = 50;
-constexpr Eigen::Index most_raced = 10000;  // rows that trees of the race learn from
+constexpr Eigen::Index most_raced = 10000;  // rows that trees of the race learn from, or
+constexpr Eigen::Index raced_part = 4;      // one in so many, if these are more
+constexpr int patience_of_few = 200;        // below enough_for_races, whose few held-out rows err
 constexpr double race_rate = 0.3;
 constexpr double soft_rate = 0.1;
 constexpr double softness = 0.6;
@@ -103,6 +105,7 @@ class OutputFit {
     const Eigen::Index rows = y_.size();
     rounds_.tree = usual_trees(rows);
     rounds_.rate = rows < enough_for_fast ? 0.05 : 0.07;
+    if (rows < enough_for_races) rounds_.patience = patience_of_few;
     rounds_.max_threads = options_.max_threads;
     name_ = "symmetric";
     if (rows >= enough_for_races && data_.hold_outs.size() == 1) {
@@ -132,7 +135,8 @@ class OutputFit {
     Random random(options_.seed);  // the same for all
     Work part(work, 0.25);
     const HoldOut& rows = data_.hold_outs.front();
-    Rounds result = boost(data_.rows, y_, some_of(rows.train, most_raced), rows.held_out, {}, few, random, part);
+    const Eigen::Index most = std::max(most_raced, std::ssize(rows.train) / raced_part);
+    Rounds result = boost(data_.rows, y_, some_of(rows.train, most), rows.held_out, {}, few, random, part);
     summary.compared.push_back({name, result.rmse * scale_});
     return result;
   }
