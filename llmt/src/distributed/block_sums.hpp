@@ -32,13 +32,12 @@ struct Block {
 
 /// The rows with the smallest hashes of their block and place in it: a sample that is the same however sums are merged.
 struct Sample {
-  static constexpr std::size_t most = 16384;
-
+  Eigen::Index most = 0;              ///< rows that are kept: Options::sample_rows
   std::vector<std::uint64_t> hashes;  ///< ascending
   std::vector<double> values;         ///< one row after the other: inputs, output, weight if there is one
 
   Sample& operator+=(const Sample& other);
-  static auto fields(auto& self) { return std::tie(self.hashes, self.values); }
+  static auto fields(auto& self) { return std::tie(self.most, self.hashes, self.values); }
 };
 
 /// What describes the columns, over the rows whose weight is not 0.

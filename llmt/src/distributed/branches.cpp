@@ -165,8 +165,7 @@ State advance(const State& state, Sums sums, const Progress& progress, int max_t
   if (has_root_model) data.root_residual = total.root_residual;
   if (data.step == Step::describe) {
     take_description(data, total.description);
-    const bool is_small = data.rows <= std::max<Eigen::Index>(data.options.branch_rows, Sample::most);
-    if (!is_small) take_sample(data, total.description.sample, progress, max_threads);
+    if (data.rows > data.options.branch_rows) take_sample(data, total.description.sample, progress, max_threads);
   }
   if (data.step == Step::grow) take_nodes(data, std::move(total.nodes));
   if (data.step == Step::gather) take_branches(data, std::move(total.branches), progress, max_threads);

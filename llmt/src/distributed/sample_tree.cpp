@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -227,6 +228,11 @@ void add_joint(const StateData& data, const Block& block, JointSums& sums) {
 void take_joint(StateData& data, JointSums sums) {
   if (std::ssize(sums.leaf_rows) != tree_of(data).num_leaves()) {
     throw std::runtime_error("llmt::distributed::advance: the sums have not the leaves of the sample's tree");
+  }
+  const Eigen::Index rows = std::reduce(sums.leaf_rows.begin(), sums.leaf_rows.end());
+  if (rows != data.rows) {
+    throw std::runtime_error(
+        fmt::format("llmt::distributed::advance: there are {} rows, and were {}: the table changed", rows, data.rows));
   }
   const Eigen::VectorXd change = solve_joint(sums.gram);
   const double error = expected_error(squares_after(sums.gram, change), data.weight, unknowns_of(data));

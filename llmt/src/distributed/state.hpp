@@ -36,6 +36,7 @@ inline std::vector<std::string> to_strings(const std::vector<Text>& from) {
 /// Options that a branch may have, as numbers.
 struct KeptOptions {
   Eigen::Index branch_rows = 0;
+  Eigen::Index sample_rows = 0;  ///< no more than branch_rows
   Eigen::Index block_rows = 0;
   Eigen::Index max_leaves = 0;
   Eigen::Index min_leaf_samples = 0;
@@ -55,9 +56,10 @@ struct KeptOptions {
   std::vector<double> shrinkages;
 
   static auto fields(auto& self) {
-    return std::tie(self.branch_rows, self.block_rows, self.max_leaves, self.min_leaf_samples, self.significance,
-                    self.pruning, self.validity, self.sparse, self.estimation, self.folds, self.fold_kind, self.seed,
-                    self.intervals, self.weighted, self.widths, self.jumps, self.ridges, self.shrinkages);
+    return std::tie(self.branch_rows, self.sample_rows, self.block_rows, self.max_leaves, self.min_leaf_samples,
+                    self.significance, self.pruning, self.validity, self.sparse, self.estimation, self.folds,
+                    self.fold_kind, self.seed, self.intervals, self.weighted, self.widths, self.jumps, self.ridges,
+                    self.shrinkages);
   }
 };
 

@@ -51,7 +51,7 @@ Eigen::Index blocks_of(const Table& table) { return (table.output.size() + block
 
 State begin(Eigen::Index branch_rows, FitOptions fit = {}) {
   fit.max_threads = 0;
-  return start({"a", "b", "c", "d"}, "y", {.branch_rows = branch_rows, .block_rows = block_rows, .fit = fit});
+  return start({"a", "b", "c", "d"}, "y", {branch_rows, branch_rows, block_rows, false, {}, fit});
 }
 
 State pass(const Table& table, const State& state) {
