@@ -1,4 +1,4 @@
-"""python3 bench/distributed/large.py LLMT ROWS FOLDER [--memory 4G] [--inputs D] [-- OPTIONS of llmt fit]: time, peak
+"""python3 bench/distributed/large.py LLMT ROWS FOLDER [--memory 4G] [--inputs D] [OPTIONS of llmt fit]: time, peak
 of resident memory and error of `llmt fit` of an Arrow file, which is written into FOLDER in pieces and deleted
 afterwards (docs/algorithms/distributed.md, "What it costs"). Needs 8 (D + 1) ROWS bytes of disk. `--lightgbm` fits
 LightGBM to the same rows instead, read into memory as 32-bit numbers."""
@@ -68,7 +68,8 @@ def fit_llmt(given: argparse.Namespace, table: Path, asked: np.ndarray) -> np.nd
     np.savetxt(rows, asked, delimiter=",", header=",".join(names), comments="", fmt="%.17g")
     predicted = given.folder / "predicted.csv"
     subprocess.run([given.llmt, "predict", model, rows, "-o", predicted], check=True)
-    values = np.loadtxt(predicted, delimiter=",", skiprows=1)[:, -1]
+    place = predicted.open().readline().strip().split(",").index("y_pred")
+    values = np.loadtxt(predicted, delimiter=",", skiprows=1, usecols=place)
     for path in (model, rows, predicted):
         path.unlink()
     return values
@@ -109,9 +110,8 @@ def main() -> int:
     parser.add_argument("--inputs", type=int, default=10)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--lightgbm", action="store_true")
-    parser.add_argument("options", nargs="*")
-    given = parser.parse_args()
-    given.options = [*given.options, "--threads", str(given.threads)]
+    given, options = parser.parse_known_args()
+    given.options = [*options, "--threads", str(given.threads)]
     table = given.folder / "large.arrow"
     try:
         begin = time.monotonic()

@@ -68,7 +68,8 @@ Sample sample_of(const StateData& data, const Block& block) {
     if (block.weight(row) == 0.0) continue;
     hashed.emplace_back(row_hash(of_block, static_cast<double>(row - block.span.begin)), row);
   }
-  Sample sample{.most = data.options.sample_rows};
+  Sample sample;
+  sample.most = data.options.sample_rows;
   const Eigen::Index kept = std::min(sample.most, std::ssize(hashed));
   std::ranges::nth_element(hashed, hashed.begin() + kept);
   hashed.resize(kept);
@@ -243,8 +244,20 @@ void check_block(const StateData& data, const Block& block) {
   }
 }
 
+std::uint64_t fingerprint_of(const StateData& data, const Block& block) {
+  std::uint64_t sum = 0;
+  for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
+    const auto place = static_cast<double>(row - block.span.begin);
+    std::uint64_t hash = row_hash(static_cast<std::uint64_t>(block.number), place);
+    for (Eigen::Index column = 0; column < data.row_columns(); ++column) hash = row_hash(hash, block.at(row, column));
+    sum += hash;
+  }
+  return sum;
+}
+
 BlockSum sum_block(const StateData& data, const Block& block) {
   BlockSum sum;
+  sum.fingerprint = fingerprint_of(data, block);
   if (data.step == Step::describe) describe(data, block, sum.description);
   if (data.step == Step::grow) grow(data, block, sum);
   if (data.step == Step::gather) gather(data, block, sum);
@@ -261,7 +274,8 @@ Sample& Sample::operator+=(const Sample& other) {
   if (other.hashes.empty()) return *this;
   if (hashes.empty()) return *this = other;
   const std::size_t columns = values.size() / hashes.size();
-  Sample both{.most = most};
+  Sample both;
+  both.most = most;
   std::size_t a = 0;
   std::size_t b = 0;
   while (std::ssize(both.hashes) < most && (a < hashes.size() || b < other.hashes.size())) {

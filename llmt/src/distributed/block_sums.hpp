@@ -76,6 +76,7 @@ struct BranchRows {
 
 /// All sums of a block, of which a step of the fit fills a part.
 struct BlockSum {
+  std::uint64_t fingerprint = 0;  ///< of the rows: another one if a value changes or a row moves
   Description description;
   Extent root_residual;
   std::map<Eigen::Index, NodeSums> nodes;
@@ -83,7 +84,7 @@ struct BlockSum {
   JointSums joint;
 
   static auto fields(auto& self) {
-    return std::tie(self.description, self.root_residual, self.nodes, self.branches, self.joint);
+    return std::tie(self.fingerprint, self.description, self.root_residual, self.nodes, self.branches, self.joint);
   }
 };
 

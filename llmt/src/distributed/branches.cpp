@@ -157,6 +157,10 @@ State advance(const State& state, Sums sums, const Progress& progress, int max_t
   }
   BlockSum total = std::move(given->runs.front().sums).total(next);
   sums = Sums();
+  if (data.passes == 0) data.fingerprint = total.fingerprint;
+  if (data.fingerprint != total.fingerprint) {
+    throw std::runtime_error("llmt::distributed::advance: the rows are not those of the first pass: the table changed");
+  }
   data.blocks = next;
   ++data.passes;
   // Before the root's model is known, its residuals have no range.

@@ -259,6 +259,12 @@ TEST(DistributedTest, WhatIsMissingOrDoesNotFitIsNamed) {
   changed.output(3) = std::nan("");
   EXPECT_TRUE(contains(message([&] { pass(changed, first); }), "row 3, column \"y\""));
   changed = table;
+  changed.inputs(1400, 2) += 1e-9;
+  EXPECT_TRUE(contains(message([&] { pass(changed, second); }), "the table changed"));
+  changed = table;
+  changed.inputs.row(1).swap(changed.inputs.row(2));
+  EXPECT_TRUE(contains(message([&] { pass(changed, second); }), "the table changed"));
+  changed = table;
   changed.inputs(300, 1) = std::nan("");
   EXPECT_TRUE(contains(message([&] { pass(changed, first); }), "\"b\" has 1 missing"));
   FitOptions options;
