@@ -1,5 +1,4 @@
-// Weights, categories and the tree of the sample beyond one memory, beside repeated rows, fit() in memory, and brute
-// force.
+// Weights, categories and the tree of the sample, beside repeated rows, fit() in memory, and brute force.
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
@@ -108,10 +107,8 @@ TEST(WeightsBeyondMemory, AWeightOfKIsKTimesTheRow) {
   EXPECT_LE((one - other).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_NEAR(weighed.counts().held_out_rmse, repeated.counts().held_out_rmse, 1e-9);
   // Without the weights it is another model.
-  EXPECT_GT((run({table.inputs, table.output, {}}, with(700, false, false)).model().predict(table.inputs) - one)
-                .cwiseAbs()
-                .maxCoeff(),
-            1e-3);
+  const State plain = run({table.inputs, table.output, {}}, with(700, false, false));
+  EXPECT_GT((plain.model().predict(table.inputs) - one).cwiseAbs().maxCoeff(), 1e-3);
 }
 
 TEST(WeightsBeyondMemory, OfPrecisionsOnlyTheRatiosMatter) {
