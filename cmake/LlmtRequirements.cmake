@@ -43,7 +43,7 @@ macro(llmt_enable_language)
       FATAL_ERROR
         "llmt: there is no C++ compiler${llmt_named_compiler}. On Debian and Ubuntu:\n"
         "  apt-get install g++ libeigen3-dev libtbb-dev libfast-float-dev libfmt-dev nlohmann-json3-dev libboost-dev "
-        "libyaml-cpp-dev libmuparser-dev liburdfdom-dev libexpat1-dev python3-dev\n"
+        "libyaml-cpp-dev libmuparser-dev liburdfdom-dev libtinyxml-dev libexpat1-dev python3-dev\n"
         "On other systems install their equivalents; README.md, Requirements, names them.")
   endif()
   enable_language(CXX)

@@ -1,6 +1,7 @@
 // What becomes of terms that were found: certain, tentative, or taken for others.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -45,6 +46,49 @@ TEST(Answers, AnOffsetBesideAPowerIsTentativeWhereAFunctionOfTheInputCouldStandF
   EXPECT_TRUE(power_and_offset({}));
   EXPECT_TRUE(power_and_offset({{"linear p", {"p"}, false}}));
   EXPECT_FALSE(power_and_offset({{"root T", {"T"}, false}}));
+}
+
+// A saturation that is nearly constant is an offset with another name.
+TEST(Answers, ATermForWhichAnOffsetCouldStandCountsAsOneBesideAPower) {
+  const auto power_and_saturation = [](std::vector<RivalTerms> rivals) {
+    Missing missing = answer_with({found_term(0, "cube", "T", 1.0, 0.01), found_term(1, "saturation", "fan", -3, 0.1)});
+    missing.found[1].rivals = std::move(rivals);
+    decide(missing, true);
+    return missing.found[0].confirmed;
+  };
+  EXPECT_TRUE(power_and_saturation({{"linear T", {"T"}, false}}));
+  EXPECT_TRUE(power_and_saturation({{"offset", {}, false}}));
+  EXPECT_FALSE(power_and_saturation({{"offset", {}, false}, {"linear T", {"T"}, false}}));
+}
+
+TEST(Answers, ATermIsTentativeIfTheIntervalOfItsCoefficientReachesZero) {
+  const auto is_confirmed = [](double standard_error) {
+    Missing missing = answer_with({found_term(0, "cube", "a", -1.0, standard_error)});
+    decide(missing, true);
+    return missing.found[0].confirmed;
+  };
+  EXPECT_TRUE(is_confirmed(0.5));
+  EXPECT_FALSE(is_confirmed(0.52));
+}
+
+TEST(Answers, AWidthIsNotBelowTheErrorsOfItsInput) {
+  constexpr Eigen::Index n = 1000;
+  const Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(n, -1.0, 1.0);
+  Inputs inputs{{"v"}, x};
+  inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, 1.0);
+  inputs.noise = Eigen::VectorXd::Constant(1, 0.01);
+  const std::vector<ModelTerm> terms = standard_terms(inputs);
+  const auto stribeck =
+      static_cast<std::size_t>(std::ranges::find(terms, "stribeck", &ModelTerm::family) - terms.begin());
+  const auto is_too_narrow = [&](double width, double of_smoothed) {
+    Missing missing = answer_with({found_term(stribeck, "stribeck", "v", 1.0, 0.01)});
+    missing.found[0].constants = Eigen::VectorXd::Constant(1, width);
+    return narrower_than_errors(missing, terms, inputs, Eigen::VectorXd::Constant(1, of_smoothed)).contains(stribeck);
+  };
+  EXPECT_TRUE(is_too_narrow(0.039, 0.0));
+  EXPECT_FALSE(is_too_narrow(0.041, 0.0));
+  EXPECT_TRUE(is_too_narrow(0.041, 0.021));
+  EXPECT_FALSE(is_too_narrow(0.041, 0.02));
 }
 
 TEST(Answers, ASearchedTermWhoseSizeIsNotKnownToAQuarterIsTentative) {
@@ -94,6 +138,8 @@ TEST(Answers, TermsOfInputsThatLeaveAsLittleAreRivalsOfAGain) {
   Missing uncertain = leaving(1.1, {inertia});
   uncertain.answer = Answer::unknown;
   EXPECT_EQ(inputs_for_gain(found, uncertain, measured, 6.0).found[0].family, "gain");
+  EXPECT_TRUE(has_gain(answer_with({found_term(0, "load_friction", "v", 0.2, 0.01)})));
+  EXPECT_FALSE(has_gain(answer_with({drag})));
 }
 
 TEST(Answers, OneHingeStandsForAHingeAtTheOtherSideWithALineAndAnOffset) {

@@ -10,6 +10,7 @@ namespace llmt::discovery {
 namespace {
 
 constexpr double clearly_less = 0.8;
+constexpr double immaterial = 0.01;  // of the squares of the gap
 
 // Sum over the outputs of the squared errors on the samples set aside, in units of those that `reference` has before
 // its terms. Each search leaves out other outliers, so units of its own would not be comparable.
@@ -22,7 +23,18 @@ double left_on_held_out(const Missing& missing, const Missing& reference) {
   return left;
 }
 
-bool is_gain(const FoundTerm& term) { return term.family == "gain"; }
+// A share of the simulated output, of its square or of its size.
+bool is_share_of_the_simulation(const std::string& family) {
+  return family == "gain" || family == "gain_curvature" || family == "load_friction";
+}
+
+bool is_gain(const FoundTerm& term) { return is_share_of_the_simulation(term.family); }
+
+Eigen::Index fitted_numbers(const Missing& missing) {
+  Eigen::Index count = 0;
+  for (const FoundTerm& term : missing.found) count += term.coefficients.size() + term.constants.size();
+  return count;
+}
 
 // The logarithm of the ratio of likelihoods of two answers on the rows that both set aside and that are no outliers of
 // both.
@@ -57,9 +69,7 @@ bool has_gain(const Missing& missing) { return std::ranges::any_of(missing.found
 std::set<std::size_t> shares_of_the_simulation(const std::vector<ModelTerm>& terms) {
   std::set<std::size_t> shares;
   for (std::size_t t = 0; t < terms.size(); ++t) {
-    if (terms[t].family == "gain" || terms[t].family == "gain_curvature" || terms[t].family == "load_friction") {
-      shares.insert(t);
-    }
+    if (is_share_of_the_simulation(terms[t].family)) shares.insert(t);
   }
   return shares;
 }
@@ -111,11 +121,23 @@ Missing Alternatives::state_for_terms(Missing found) const {
   return is_better ? of_state : found;
 }
 
+Missing Alternatives::terms_for_state(Missing found) const {
+  if (!has_judges(found) || found.answer != Answer::inner_state) return found;
+  Missing plain = without(*refuted_, [](const ModelTerm& term) { return !term.inner_state.empty(); });
+  const auto holds = [](const FoundTerm& term) { return term.confirmed && !term.generic; };
+  const bool is_plain = !plain.found.empty() && plain.found.size() <= found.found.size() &&
+                        plain.answer != Answer::failed_held_out && std::ranges::all_of(plain.found, holds);
+  if (!is_plain) return found;
+  constexpr double nearly_nothing = 0.1;  // of the squares of the gap: what shows a state explains it
+  const double left = left_on_held_out(plain, found);
+  const bool explains_all = left < nearly_nothing * static_cast<double>(found.gaps.size());
+  return explains_all && left <= left_on_held_out(found, found) + immaterial ? plain : found;
+}
+
 Missing Alternatives::causes_for_shapes(Missing found) const {
   if (!has_judges(found) || std::ranges::none_of(found.found, &FoundTerm::generic)) return found;
   Missing of_causes = without(*refuted_, [](const ModelTerm& term) { return term.generic; });
   constexpr double as_little = 1.1;
-  constexpr double immaterial = 0.01;
   const double left = left_on_held_out(found, found);
   const bool is_as_good = of_causes.answer != Answer::failed_held_out && !of_causes.found.empty() &&
                           left_on_held_out(of_causes, found) <= std::max(as_little * left, left + immaterial);
@@ -131,11 +153,11 @@ Missing Alternatives::plain_for_searched(Missing found) const {
   for (const std::vector<std::string>& place : places) {
     Missing plain =
         without(*refuted_, [&](const ModelTerm& term) { return term.inputs == place && !term.constants.empty(); });
-    const auto holds = [](const FoundTerm& term) { return term.confirmed && !term.generic; };
-    if (!plain.found.empty() && std::ranges::all_of(plain.found, holds) &&
-        left_on_held_out(plain, found) < clearly_less * left_on_held_out(found, found)) {
-      found = std::move(plain);
-    }
+    if (plain.found.empty() || std::ranges::any_of(plain.found, &FoundTerm::generic)) continue;
+    const double ratio = left_on_held_out(plain, found) / left_on_held_out(found, found);
+    const bool holds = std::ranges::all_of(plain.found, &FoundTerm::confirmed);
+    const bool has_fewer = fitted_numbers(plain) < fitted_numbers(found);
+    if ((holds && ratio < clearly_less) || (has_fewer && ratio < 1.0)) found = std::move(plain);
   }
   return found;
 }

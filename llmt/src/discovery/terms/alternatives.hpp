@@ -29,12 +29,18 @@ class Alternatives {
   /// others, but such terms alone hold and leave less than what was found without them, they are the answer.
   Missing state_for_terms(Missing found) const;
 
+  /// What a measured input shows, as a second encoder shows a spring, a state explains too, without the errors of that
+  /// input. Where plain terms alone, no more of them, leave next to nothing and little more than a state does, they are
+  /// the answer.
+  Missing terms_for_state(Missing found) const;
+
   /// Shapes follow noise that is alike in neighbours farther than causes do, and they follow what is small beside the
   /// causes. Where causes alone leave as little, they are the answer.
   Missing causes_for_shapes(Missing found) const;
 
   /// What a term with a constant misses makes neighbours alike, so that few samples count and two plain terms in its
-  /// place do not seem to be worth their cost. Where terms without constants leave clearly less, they are the answer.
+  /// place do not seem to be worth their cost. Where terms without constants leave clearly less, or no more with fewer
+  /// fitted numbers, they are the answer.
   Missing plain_for_searched(Missing found) const;
 
  private:
@@ -50,7 +56,7 @@ class Alternatives {
   Missing without(std::set<std::size_t> refuted, const std::function<bool(const ModelTerm&)>& left_out) const;
 };
 
-/// Whether a share of the simulated output was found.
+/// Whether a share of the simulated output was found, or of its size.
 bool has_gain(const Missing& missing);
 
 /// The indices of terms that are a share of the simulated output.

@@ -68,18 +68,19 @@ bool has_rival_of(const FoundTerm& found, const std::string& input) {
   });
 }
 
-// Inputs and output of a term. One without inputs, as an offset is, stands in time also where a function of one input
+// Inputs and output of a term. One for which an offset could stand is, in time, also where a function of one input
 // would explain as well in its place.
 using Place = std::pair<std::vector<std::string>, Eigen::Index>;
 std::vector<Place> places_of(const FoundTerm& found, bool in_time) {
   constexpr std::size_t most_inputs = 2;
-  if (!found.inputs.empty()) {
-    if (found.inputs.size() > most_inputs) return {};
-    return {{sorted_inputs(found), found.output_index}};
-  }
   std::vector<Place> places;
+  if (!found.inputs.empty() && found.inputs.size() <= most_inputs) {
+    places.emplace_back(sorted_inputs(found), found.output_index);
+  }
+  const bool is_like_an_offset =
+      found.inputs.empty() || std::ranges::any_of(found.rivals, [](const RivalTerms& r) { return r.what == "offset"; });
   for (const RivalTerms& rival : found.rivals) {
-    if (in_time && rival.inputs.size() == 1) places.emplace_back(rival.inputs, found.output_index);
+    if (in_time && is_like_an_offset && rival.inputs.size() == 1) places.emplace_back(rival.inputs, found.output_index);
   }
   return places;
 }
@@ -108,12 +109,14 @@ std::vector<bool> approximations(const std::vector<FoundTerm>& all, bool in_time
   return approximate;
 }
 
-// The coefficient of a term with a constant whose interval of 95 % reaches farther than a quarter of it; -1: none.
-// Noise at the inputs, or few rows where the term lives, leave its size and its shape to each other.
+// The coefficient whose interval of 95 % reaches zero or, of a term with a constant, farther than a quarter of it; -1:
+// none. Noise at the inputs, or few rows where the term lives, leave its size and its shape to each other.
 Eigen::Index uncertain_coefficient(const FoundTerm& found) {
-  constexpr double far = 0.25;
+  const double far = found.constants.size() > 0 ? 0.25 : 1.0;
   constexpr double quantile = 1.96;
-  for (Eigen::Index k = 0; k < found.coefficients.size() && found.constants.size() > 0; ++k) {
+  // A wave and a law of several parts may have parts of no size.
+  if (found.constants.size() == 0 && found.coefficients.size() > 1) return -1;
+  for (Eigen::Index k = 0; k < found.coefficients.size(); ++k) {
     const TermValue& own = found.values[static_cast<std::size_t>(k)];
     if (quantile * own.standard_error > far * std::abs(own.value)) return k;
   }
@@ -239,9 +242,9 @@ void decide(Missing& missing, bool in_time) {
       found.confirmed = false;
       missing.notes.push_back(
           fmt::format("the {} of {} is {:.3g} with a standard error of {:.2g}: the term is tentative, "
-                      "because its size is not known to a quarter",
+                      "because its size is not known{}",
                       own.name, found.location.empty() ? found.family : found.family + " " + found.location, own.value,
-                      own.standard_error));
+                      own.standard_error, found.constants.size() > 0 ? " to a quarter" : ""));
     }
     if (!approximate[k] || !noted.insert(sorted_inputs(found)).second) continue;
     missing.notes.push_back(
@@ -269,9 +272,10 @@ std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector
 }
 
 std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::vector<ModelTerm>& terms,
-                                           const Inputs& inputs) {
+                                           const Inputs& inputs, const Eigen::VectorXd& of_smoothed) {
   // Up to 3 the sign of the input may be wrong, and what the simulation has of it.
   constexpr double visible = 4.0;  // standard deviations
+  constexpr double smoothed_away = 2.0;
   std::set<std::size_t> narrow;
   const auto has_width = [&](const FoundTerm& found) {
     const std::vector<TermConstant>& constants = terms[found.term].constants;
@@ -283,7 +287,8 @@ std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::ve
   for (const FoundTerm& found : missing.found) {
     if (!has_width(found)) continue;
     const auto column = std::ranges::find(inputs.names, found.inputs.front()) - inputs.names.begin();
-    if (std::abs(found.constants(0)) < visible * std::sqrt(variance(column))) narrow.insert(found.term);
+    const double least = std::max(visible * std::sqrt(variance(column)), smoothed_away * of_smoothed(column));
+    if (std::abs(found.constants(0)) < least) narrow.insert(found.term);
   }
   return narrow;
 }

@@ -47,10 +47,11 @@ void demand_certainty(Missing& missing);
 /// the largest damping ratio tried or more: a filter, no machine, has such constants.
 std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms);
 
-/// The indices in `terms` of those that were found with a width below 4 standard deviations of the errors of
-/// their input: the errors smear what is so narrow, and it follows single rows.
+/// The indices in `terms` of those that were found with a width below 4 standard deviations of the errors of their
+/// input: the errors smear what is so narrow, and it follows single rows. Where the input was smoothed, whose errors
+/// before are `of_smoothed`, 2 of these count as well: the simulation saw them.
 std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::vector<ModelTerm>& terms,
-                                           const Inputs& inputs);
+                                           const Inputs& inputs, const Eigen::VectorXd& of_smoothed);
 
 /// Of the errors of an output on the samples set aside: at the nominal parameters, with parameters alone, with terms.
 Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,

@@ -185,7 +185,11 @@ bool is_derivative_of(const Derivatives& derivatives, const Eigen::VectorXd& inp
 
 SmoothedInputs smoothed(const Inputs& inputs, const Eigen::MatrixXd& simulated) {
   const Eigen::Index n = inputs.values.rows();
-  SmoothedInputs result{.inputs = inputs, .change = {}, .unknown_sign = std::vector<bool>(n, false), .notes = {}};
+  SmoothedInputs result{.inputs = inputs,
+                        .errors = Eigen::VectorXd::Zero(inputs.values.cols()),
+                        .change = {},
+                        .unknown_sign = std::vector<bool>(n, false),
+                        .notes = {}};
   constexpr Eigen::Index fewest = 60;
   // What has the wrong shape is refused by the search.
   if (inputs.instants.size() == 0 || n < fewest || simulated.rows() != n || !simulated.allFinite()) return result;
@@ -222,6 +226,7 @@ SmoothedInputs smoothed(const Inputs& inputs, const Eigen::MatrixXd& simulated) 
       if (!better.is_smooth[i] && std::abs(own(i, 1)) < unknown * errors(1)) result.unknown_sign[i] = true;
     }
     result.inputs.values.col(motion.speed) = better.values;
+    result.errors(motion.speed) = errors(1);
     if (result.inputs.noise.size() > 0) result.inputs.noise(motion.speed) = better.error;
     result.notes.push_back(fmt::format(
         "{} was smoothed, as the derivative of {} by time: standard deviation of its errors {:.2g} -> {:.2g}",

@@ -27,6 +27,7 @@ bool is_derivative_of(const Derivatives& derivatives, const Eigen::VectorXd& inp
 /// Inputs whose speeds have less errors, and what that changes.
 struct SmoothedInputs {
   Inputs inputs;
+  Eigen::VectorXd errors;          ///< standard deviations in what was replaced, before; 0: the input was not smoothed
   Eigen::MatrixXd change;          ///< n x d of the simulated outputs; empty: nothing was smoothed
   std::vector<bool> unknown_sign;  ///< rows at which a speed was not smoothed, and is within 3 standard deviations of 0
   std::vector<std::string> notes;  ///< in sentences

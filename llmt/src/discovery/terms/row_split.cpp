@@ -126,14 +126,13 @@ double variance_within(const std::vector<Piece>& pieces, const Eigen::VectorXd& 
   return rows > 0.0 ? sum / rows : std::numeric_limits<double>::infinity();
 }
 
-Eigen::Index block_length(const std::vector<Piece>& pieces, const Inputs& inputs, const MissingOptions& options,
-                          Eigen::Index fewest_samples) {
+// The longest block that the inputs bear; 1 where most of them are not smooth.
+Eigen::Index longest_block(const std::vector<Piece>& pieces, const Inputs& inputs, Eigen::Index fewest_samples) {
   constexpr double largest_loss = 0.03;
   const auto n = static_cast<Eigen::Index>(inputs.values.rows());
-  const Eigen::Index needed = (n + options.largest_sample - 1) / options.largest_sample;
   std::vector<Smoothness> signals = smoothness_of(pieces, inputs);
   const auto smooth = std::ranges::count_if(signals, &Smoothness::is_smooth);
-  if (2 * smooth < std::ssize(signals) || signals.empty()) return needed;
+  if (2 * smooth < std::ssize(signals) || signals.empty()) return 1;
   std::erase_if(signals, [](const Smoothness& signal) { return !signal.is_smooth(); });
   Eigen::Index length = 1;
   const auto bears = [&](Eigen::Index trial) {
@@ -148,7 +147,13 @@ Eigen::Index block_length(const std::vector<Piece>& pieces, const Inputs& inputs
     if (n / trial < fewest_samples || !bears(trial)) break;
     length = trial;
   }
-  return std::max(length, needed);
+  return length;
+}
+
+Eigen::Index block_length(const std::vector<Piece>& pieces, const Inputs& inputs, const MissingOptions& options,
+                          Eigen::Index fewest_samples) {
+  const Eigen::Index needed = (inputs.values.rows() + options.largest_sample - 1) / options.largest_sample;
+  return std::max(needed, longest_block(pieces, inputs, fewest_samples));
 }
 
 // Consecutive rows of a piece that are searched or set aside together.
@@ -250,6 +255,23 @@ RowSplit split_independent(const Inputs& inputs, const MissingOptions& options) 
     }
   }
   return split;
+}
+
+Eigen::Index bearable_block(const Inputs& inputs, const MissingOptions& options) {
+  return longest_block(recording_of(inputs).pieces, inputs, options.largest_sample);
+}
+
+Samples blocks_in_time(const Inputs& inputs, Eigen::Index length) {
+  Samples blocks;
+  for (const Piece& piece : recording_of(inputs).pieces) {
+    const Eigen::Index n = std::ssize(piece);
+    const Eigen::Index count = std::max<Eigen::Index>(1, n / length);
+    for (Eigen::Index b = 0; b < count; ++b) {
+      const Eigen::Index begin = b * n / count;
+      blocks.add(std::span(piece).subspan(begin, (b + 1) * n / count - begin));
+    }
+  }
+  return blocks;
 }
 
 RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options, Eigen::Index fewest_samples) {

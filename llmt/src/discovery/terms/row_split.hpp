@@ -26,6 +26,13 @@ RowSplit split_independent(const Inputs& inputs, const MissingOptions& options);
 /// block within which every smooth input varies by at most 3 % of its variance, its noise not counted.
 RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options, Eigen::Index fewest_samples);
 
+/// The longest block, of those that leave at least largest_sample of them, that the inputs bear, as in split_in_time();
+/// 1 where fewer than half of the inputs are smooth.
+Eigen::Index bearable_block(const Inputs& inputs, const MissingOptions& options);
+
+/// Blocks of `length` consecutive rows or a little more, each within one stretch of a recording.
+Samples blocks_in_time(const Inputs& inputs, Eigen::Index length);
+
 /// Variance of the noise of equally spaced values of a smooth signal, from third differences: var(D^3 e) = 20 var(e).
 /// NaN for fewer than 4 values.
 double noise_variance(const Eigen::VectorXd& values);

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "discovery/terms/alternatives.hpp"
+#include "discovery/terms/averaged_rows.hpp"
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/determined.hpp"
 #include "discovery/terms/motion.hpp"
@@ -129,9 +131,10 @@ std::vector<std::string> notes_on_reversals(const std::vector<Reversals>& revers
 // Searches until what is found holds on the rows set aside. Terms that are refuted there are no candidates of the next
 // search, which sets other rows aside. In time, what follows noise that is alike in neighbours lives on few rows: a
 // term must shrink the gap on the rows set aside, of one search or the next.
-Missing find_at(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, const MeasuredOutputs& measured,
                 const std::vector<ModelTerm>& terms, const SearchedRows& rows, MissingOptions options,
                 std::set<std::size_t> refuted, Missing missing) {
+  const Inputs& inputs = smooth.inputs;
   const bool in_time = inputs.instants.size() > 0;
   const int most = in_time ? 4 : 3;
   std::set<std::size_t> unproven;
@@ -139,7 +142,7 @@ Missing find_at(const Simulation& simulation, const Inputs& inputs, const Measur
   for (int trial = 1;; ++trial) {
     if (trial > 1) missing = search_once(simulation, inputs, measured, terms, rows, options, refuted);
     const std::set<std::size_t> beyond = beyond_constants(missing, terms);
-    const std::set<std::size_t> narrow = narrower_than_errors(missing, terms, inputs);
+    const std::set<std::size_t> narrow = narrower_than_errors(missing, terms, inputs, smooth.errors);
     const auto is_unproven = [&](const FoundTerm& found) { return in_time && !found.shrinks_gap; };
     const bool holds =
         missing.answer != Answer::failed_held_out && std::ranges::none_of(missing.found, [&](const FoundTerm& found) {
@@ -149,6 +152,7 @@ Missing find_at(const Simulation& simulation, const Inputs& inputs, const Measur
     if (holds || (trial >= most && beyond.empty() && narrow.empty())) {
       const Alternatives alternatives{simulation, inputs, measured, terms, rows, options, refuted};
       missing = alternatives.state_for_terms(std::move(missing));
+      missing = alternatives.terms_for_state(std::move(missing));
       missing = alternatives.causes_for_shapes(std::move(missing));
       missing = alternatives.plain_for_searched(std::move(missing));
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
@@ -234,7 +238,8 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
       return simulation.predict(as_given.values, values) + smooth.change;
     };
   }
-  const Inputs inputs = with_zero_bands(there, smooth.inputs, measured);
+  smooth.inputs = with_zero_bands(there, std::move(smooth.inputs), measured);
+  const Inputs& inputs = smooth.inputs;
   SearchedRows rows{rows_at_rest(inputs)};
   for (std::size_t i = 0; i < rows.apart.size(); ++i) rows.apart[i] = rows.apart[i] || smooth.unknown_sign[i];
   const auto search_without = [&](std::set<std::size_t> refuted) {
@@ -246,7 +251,7 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
       beginning = begin(there, inputs, measured, terms, rows, options, refuted);
     }
     Missing found =
-        find_at(there, inputs, measured, terms, beginning.rows, options, refuted, std::move(beginning.missing));
+        find_at(there, smooth, measured, terms, beginning.rows, options, refuted, std::move(beginning.missing));
     found.notes.insert(found.notes.begin(), beginning.at_reversals.begin(), beginning.at_reversals.end());
     return found;
   };
@@ -266,6 +271,15 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   missing.notes.insert(missing.notes.begin(), at_rest.begin(), at_rest.end());
   missing.notes.insert(missing.notes.begin(), smooth.notes.begin(), smooth.notes.end());
   return missing;
+}
+
+// Of a log with more rows than a search can use, means over few rows are searched.
+Missing find_in_rows(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                     const std::vector<ModelTerm>& terms, const MissingOptions& options) {
+  const std::optional<AveragedRows> few = averaged(inputs, measured, options);
+  if (!few) return find(simulation, inputs, measured, terms, options);
+  return of_all_rows(find(averaged(simulation, inputs, few->blocks), few->inputs, few->measured, terms, options), *few,
+                     simulation, terms, inputs);
 }
 
 // Whether what is left is alike in neighbouring rows.
@@ -290,13 +304,13 @@ Missing find_along_rows(const Simulation& simulation, const Inputs& inputs, cons
   const AlongRows rows = is_told ? AlongRows::independent : along_rows(inputs, options);
   Missing missing;
   if (rows != AlongRows::measured_signal) {
-    missing = find(simulation, inputs, measured, terms, options);
+    missing = find_in_rows(simulation, inputs, measured, terms, options);
     if (rows == AlongRows::independent || !is_alike_in_neighbours(measured, missing)) return missing;
   }
   Inputs in_time = inputs;
   in_time.instants =
       Eigen::VectorXd::LinSpaced(inputs.values.rows(), 0.0, static_cast<double>(inputs.values.rows() - 1));
-  missing = find(simulation, in_time, measured, terms, options);
+  missing = find_in_rows(simulation, in_time, measured, terms, options);
   missing.time.found_out = true;
   return missing;
 }
