@@ -30,6 +30,8 @@ constexpr Eigen::Index blocks_at_once = 4;
 constexpr double bytes_per_byte = 5.0;
 // The part of the memory that branches may take; the rest is for sums and the tree.
 constexpr double part_for_branches = 0.75;
+// A sample takes this part of a branch's rows at most: a pass holds several before they are merged.
+constexpr Eigen::Index part_for_sample = 4;
 
 void refuse_options_of_csv(const CLI::App& command) {
   constexpr std::string_view taken[] = {
@@ -199,6 +201,8 @@ void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& argumen
   table.require_numbers({columns.names.begin() + columns.inputs, columns.names.end()});
   options.fit.intervals = !arguments.no_intervals;
   options.branch_rows = branch_rows_of(arguments, columns.names.size());
+  options.sample_rows =
+      std::min(options.sample_rows, std::max<Eigen::Index>(options.branch_rows / part_for_sample, 100));
   const bool is_first = processes.rank() == 0;
   constexpr std::size_t most_words = 255;  // distributed::Options::levels
   if (is_first) options.levels = table.levels(inputs, most_words);

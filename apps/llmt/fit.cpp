@@ -186,8 +186,8 @@ void add_fit(CLI::App& app) {
     }
     for (const char* option : {"--memory", "--checkpoint", "--resume"}) {
       if (command->count(option) > 0) {
-        throw std::invalid_argument(
-            fmt::format("{} is for Arrow files, and for several; llmt table makes one", option));
+        throw std::invalid_argument(fmt::format("{}: {} is for Arrow files, and for several; llmt table makes one",
+                                                arguments->learning.data, option));
       }
     }
     require_target(arguments->learning);

@@ -1,15 +1,10 @@
-"""python3 bench/distributed/dask_workers.py [--rows N] [--kills K]: fits of a folder of Parquet files by worker
-processes of Dask, each number of workers beside the first; then with a worker killed at K random moments. Prints
-seconds, bytes of the sums of each pass, seconds of transfers between workers, and whether the model is the same to the
-byte (docs/algorithms/distributed.md)."""
+"""python3 bench/distributed/dask_workers.py [--rows N]: fits of a folder of Parquet files by worker processes of Dask,
+each number of workers beside the first. Prints seconds, bytes of the sums of each pass, seconds of transfers between
+workers, and whether the model is the same to the byte (docs/algorithms/distributed.md). dask_faults.py kills them."""
 
 import argparse
-import os
-import random
-import signal
 import sys
 import tempfile
-import threading
 import time
 from pathlib import Path
 
@@ -46,26 +41,17 @@ class Passes:
         return self._advance(state, sums)
 
 
-def kill_a_worker(cluster, moment: float, killed: list[int], ended: threading.Event) -> None:
-    if ended.wait(moment):
-        return
-    pids = [worker.pid for worker in cluster.workers.values() if worker.pid]
-    if pids:
-        os.kill(random.choice(pids), signal.SIGKILL)
-        killed.append(1)
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", type=int, default=200_000)
     parser.add_argument("--files", type=int, default=8)
-    parser.add_argument("--kills", type=int, default=3)
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2, 4])
     given = parser.parse_args()
     from distributed import Client, LocalCluster, get_task_stream
 
     options = {
         "branch_rows": given.rows // 4,
+        "sample_rows": given.rows // 8,
         "block_rows": 8192,
         "estimator": LocalLinearTreeRegressor(validity="crisp", max_leaves=8, n_jobs=1),
     }
@@ -87,29 +73,16 @@ def main() -> int:
                     model = llmt_dask.fit(folder, "y", client=client, **options).to_json()
                     seconds = time.monotonic() - begin
                     distributed.advance = passes._advance
-                transfers = [part for task in stream.data for part in task["startstops"] if part["action"] == "transfer"]
+                transfers = [
+                    part for task in stream.data for part in task["startstops"] if part["action"] == "transfer"
+                ]
                 moved = sum(part["stop"] - part["start"] for part in transfers)
-            print(f"{count} workers: {seconds:.1f} s, {moved:.2f} s in {len(transfers)} transfers, same bytes: {model == expected}")
+            print(
+                f"{count} workers: {seconds:.1f} s, {moved:.2f} s in {len(transfers)} transfers, "
+                f"same bytes: {model == expected}"
+            )
             same = same and model == expected
         print("bytes of the sums:", ", ".join(f"{step} {count}" for step, count in passes.bytes))
-        random.seed(1)
-        killed: list[int] = []
-        with LocalCluster(n_workers=2, **of_workers) as cluster:
-            with Client(cluster) as client:
-                fits = 0
-                while len(killed) < given.kills:
-                    client.wait_for_workers(2, timeout=120)
-                    ended = threading.Event()
-                    moment = random.uniform(0.0, seconds)
-                    killer = threading.Thread(target=kill_a_worker, args=(cluster, moment, killed, ended))
-                    killer.start()
-                    model = llmt_dask.fit(folder, "y", client=client, timeout=300, **options).to_json()
-                    ended.set()
-                    killer.join()
-                    fits += 1
-                    same = same and model == expected
-                    print(f"  killed after {moment:.2f} s: same bytes: {model == expected}", flush=True)
-        print(f"{len(killed)} workers killed in {fits} fits, all models the same to the byte: {same}")
     return 0 if same else 1
 
 

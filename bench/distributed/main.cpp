@@ -53,21 +53,30 @@ int main(int argc, char** argv) {
   CLI::App app{"Trees by sums over blocks beside fit() in memory"};
   Eigen::Index rows = 100000;
   Eigen::Index parts = 8;
+  Eigen::Index sample = 131072;
+  int threads = 0;
+  bool only_sums = false;
   app.add_option("--rows", rows, "Rows to learn from")->check(CLI::Range(1000, 1 << 30));
   app.add_option("--parts", parts, "Rows divided by the largest branch")->check(CLI::Range(1, 1000));
+  app.add_option("--sample", sample, "Rows of the sample")->check(CLI::Range(100, 1 << 30));
+  app.add_option("--threads", threads, "0: all")->check(CLI::Range(0, 1024));
+  app.add_flag("--only-sums", only_sums, "Leave fit() out");
   CLI11_PARSE(app, argc, argv);
   const Table table = friedman(rows, 1);
   const Table asked = friedman(50000, 2);
   llmt::FitOptions options;
   options.intervals = false;
+  options.max_threads = threads;
   Clock::time_point begin = Clock::now();
-  print_row("fit()", begin, llmt::fit(table.inputs, table.output, options).model, asked);
+  if (!only_sums) print_row("fit()", begin, llmt::fit(table.inputs, table.output, options).model, asked);
   std::vector<std::string> names;
   for (int j = 1; j <= 10; ++j) names.push_back(fmt::format("x{}", j));
   begin = Clock::now();
-  llmt::distributed::State state = llmt::distributed::start(names, "y", {.branch_rows = rows / parts, .fit = options});
+  const llmt::distributed::Options by_sums{.branch_rows = rows / parts, .sample_rows = sample, .fit = options};
+  llmt::distributed::State state = llmt::distributed::start(names, "y", by_sums);
   while (!state.finished()) {
-    state = llmt::distributed::advance(state, llmt::distributed::sums({table.inputs, table.output, 0}, state));
+    llmt::distributed::Sums all = llmt::distributed::sums({table.inputs, table.output, 0}, state, threads);
+    state = llmt::distributed::advance(state, std::move(all), {}, threads);
   }
   print_row("sums", begin, state.model(), asked);
 }

@@ -42,8 +42,8 @@ Sums sums_of_all(const State& state) { return sums({table().inputs, table().outp
 // The bytes of all states of a fit, and of the sums that they ask for.
 const std::vector<std::string>& stages() {
   static const std::vector<std::string> all = [] {
-    Options options{
-        .branch_rows = 130, .block_rows = block_rows, .weighted = true, .levels = {{}, {}, {"r", "s", "t"}}};
+    Options options{.branch_rows = 130, .sample_rows = 100, .block_rows = block_rows, .weighted = true};
+    options.levels = {{}, {}, {"r", "s", "t"}};
     options.fit.max_leaves = 2;
     options.fit.folds.count = 0;
     options.fit.validity = llmt::ValidityChoice::crisp;

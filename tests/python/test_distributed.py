@@ -34,7 +34,8 @@ def run(shards, state):
 
 def started(branch_rows):
     estimator = LocalLinearTreeRegressor(validity="crisp", max_leaves=6)
-    return distributed.start(["a", "b", "c"], "y", branch_rows=branch_rows, block_rows=BLOCK, estimator=estimator)
+    memory = {"branch_rows": branch_rows, "sample_rows": min(branch_rows, 600)}
+    return distributed.start(["a", "b", "c"], "y", **memory, block_rows=BLOCK, estimator=estimator)
 
 
 def test_the_same_bytes_for_any_shards_in_any_order():
@@ -108,7 +109,12 @@ def by_hand(limits, state):
     return distributed.estimator(state).to_json()
 
 
-OPTIONS = {"branch_rows": 600, "block_rows": BLOCK, "estimator": LocalLinearTreeRegressor(validity="crisp", max_leaves=6)}
+OPTIONS = {
+    "branch_rows": 600,
+    "sample_rows": 600,
+    "block_rows": BLOCK,
+    "estimator": LocalLinearTreeRegressor(validity="crisp", max_leaves=6),
+}
 
 
 def test_dask_gives_the_bytes_of_one_process(frames, tmp_path):
@@ -204,6 +210,7 @@ def test_words_and_weights_by_any_shards():
         ["a", "w"],
         "y",
         branch_rows=500,
+        sample_rows=500,
         block_rows=BLOCK,
         levels={"w": ["high", "low", "mid"]},
         weighted=True,
@@ -258,7 +265,7 @@ def test_dask_finds_words_and_takes_weights(tmp_path, kind):
         options = {"estimator": LocalLinearTreeRegressor(validity="crisp", max_leaves=6), "weight": "k"}
         whole = llmt_dask.fit(table, "y", **options)
         assert whole.to_json() == expected.to_json()
-        large = llmt_dask.fit(table, "y", branch_rows=400, block_rows=BLOCK, **options)
+        large = llmt_dask.fit(table, "y", branch_rows=400, sample_rows=400, block_rows=BLOCK, **options)
         predicted = llmt_dask.predict(large, table).compute().to_numpy()
     assert np.sqrt(np.average((predicted - kept["y"]) ** 2, weights=kept["k"])) < 2 * NOISE
 

@@ -36,6 +36,7 @@ def fit(
     weight: str | None = None,
     estimator: LocalLinearTreeRegressor | None = None,
     branch_rows: int = 4_000_000,
+    sample_rows: int = 131_072,
     block_rows: int = 65_536,
     client: Any = None,
     timeout: float = 3600.0,
@@ -47,15 +48,16 @@ def fit(
     Parameters
     ----------
     table : dask.dataframe.DataFrame, or path of a folder
-        Target and weight hold numbers, inputs numbers or words, of which at most 255 may differ. A folder stands for its files ``*.parquet`` in the order of their names;
-        each is read piece by piece, and may be larger than a worker's memory. A partition of a frame must fit.
+        Target and weight hold numbers, inputs numbers or words, of which at most 255 may differ. A folder stands for
+        its files ``*.parquet`` in the order of their names; each is read piece by piece, and may be larger than a
+        worker's memory. A partition of a frame must fit.
     target : str
         The column to predict.
     inputs : sequence of str, optional
         Columns to predict from; by default all others.
     weight : str, optional
         The column of the rows' weights, as ``sample_weight`` of `LocalLinearTreeRegressor.fit`.
-    estimator, branch_rows, block_rows
+    estimator, branch_rows, sample_rows, block_rows
         As for :func:`llmt.distributed.start`. Partitions of a multiple of ``block_rows`` rows are summed fastest.
     client : distributed.Client, optional
         By default the current one. Where there is none, the scheduler of `dask.config` computes in this process.
@@ -89,6 +91,7 @@ def fit(
         chosen,
         target,
         branch_rows=branch_rows,
+        sample_rows=sample_rows,
         block_rows=block_rows,
         levels={name: levels for name, levels in words.items() if levels},
         weighted=weight is not None,

@@ -8,7 +8,7 @@ after a pass is a checkpoint. :mod:`llmt.dask` does all this with Dask.
 >>> from llmt import distributed
 >>> X = np.random.default_rng(0).uniform(-1, 1, (600, 2))
 >>> y = np.where(X[:, 0] > 0, 3 * X[:, 1], 1.0)
->>> state = distributed.start(["a", "b"], "y", branch_rows=400, block_rows=100)
+>>> state = distributed.start(["a", "b"], "y", branch_rows=400, sample_rows=400, block_rows=100)
 >>> while distributed.status(state)["step"] != "finished":
 ...     later = distributed.sums(state, X[200:], y[200:], first_block=2)
 ...     earlier = distributed.sums(state, X[:200], y[:200], first_block=0)
@@ -44,6 +44,7 @@ def start(
     target: str,
     *,
     branch_rows: int = 4_000_000,
+    sample_rows: int = 131_072,
     block_rows: int = 65_536,
     levels: Mapping[str, Sequence[str]] | None = None,
     weighted: bool = False,
@@ -58,7 +59,9 @@ def start(
     target : str
     branch_rows : int
         Branches of the tree with at most so many rows are brought into one memory and fitted there. A table that has
-        no more rows becomes the model of `LocalLinearTreeRegressor.fit`, to the byte.
+        no more rows becomes the model of `LocalLinearTreeRegressor.fit`, to the byte. No fewer than `sample_rows`.
+    sample_rows : int
+        Rows of the sample that the first pass brings into one memory: a first tree is grown from it.
     block_rows : int
         Rows of a block, of which sums are made.
     levels : mapping of str to sequence of str, optional
@@ -85,8 +88,9 @@ def start(
         if name not in names:
             raise ValueError(f'levels has "{name}", which is no input; the inputs are {", ".join(names)}')
     of_inputs = [by_name.get(name, []) for name in names]
+    memory = (branch_rows, sample_rows, block_rows)
     options = given._options_without_columns()
-    return _core.distributed_start(names, str(target), branch_rows, block_rows, weighted, of_inputs, options)
+    return _core.distributed_start(names, str(target), *memory, weighted, of_inputs, options)
 
 
 def sums(
@@ -153,10 +157,10 @@ def status(state: bytes) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``step``: what the next pass does, "describe", "grow", "gather" or "blend", or "finished"; ``passes`` so far; ``rows`` of
-        the table, 0 before the first pass; ``top_leaves`` of the top of the tree; ``branches`` among them that are
-        fitted in memory, and ``branches_done``; ``rows_to_come``, which the next pass brings together; ``is_of_sample``, whether the model is the tree of the
-        sample in place of top and branches; and
+        ``step``: what the next pass does, "describe", "grow", "gather" or "blend", or "finished"; ``passes`` so far;
+        ``rows`` of the table, 0 before the first pass; ``top_leaves`` of the top of the tree; ``branches`` among them
+        that are fitted in memory, and ``branches_done``; ``rows_to_come``, which the next pass brings together;
+        ``is_of_sample``, whether the model is the tree of the sample in place of top and branches; and
         ``held_out_rmse`` of the finished model.
     """
     result: dict[str, Any] = _core.distributed_status(state)

@@ -30,8 +30,11 @@ namespace llmt::distributed {
 
 struct Options {
   /// A branch of the tree with at most this many rows is brought into one memory, where fit() finishes it. At least
-  /// 100. A table with no more rows becomes the model of fit(), to the byte.
+  /// 100, and no fewer than sample_rows. A table with no more rows becomes the model of fit(), to the byte.
   Eigen::Index branch_rows = 4'000'000;
+  /// Of the sample that the first pass brings into one memory: bins are cut and a first tree is grown from it. At least
+  /// 100.
+  Eigen::Index sample_rows = 131072;
   Eigen::Index block_rows = 65536;  ///< of a block, of which sums are made; see Rows
   bool weighted = false;            ///< whether rows have weights
   /// Of each input the names of its categories, which its values number from 0 on, as TrainingData::levels; at most

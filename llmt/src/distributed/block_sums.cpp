@@ -61,21 +61,22 @@ void check_weight(double weight, Eigen::Index row) {
   refuse(fmt::format("row {}: the weight is {}, it must be from 0 to {:g}", row, weight, largest_magnitude));
 }
 
-Sample sample_of(const Block& block, Eigen::Index columns) {
+Sample sample_of(const StateData& data, const Block& block) {
   std::vector<std::pair<std::uint64_t, Eigen::Index>> hashed;
   const std::uint64_t of_block = row_hash(0, static_cast<double>(block.number));
   for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
     if (block.weight(row) == 0.0) continue;
     hashed.emplace_back(row_hash(of_block, static_cast<double>(row - block.span.begin)), row);
   }
-  const std::size_t kept = std::min(Sample::most, hashed.size());
-  std::ranges::nth_element(hashed, hashed.begin() + static_cast<std::ptrdiff_t>(kept));
+  Sample sample;
+  sample.most = data.options.sample_rows;
+  const Eigen::Index kept = std::min(sample.most, std::ssize(hashed));
+  std::ranges::nth_element(hashed, hashed.begin() + kept);
   hashed.resize(kept);
   std::ranges::sort(hashed);
-  Sample sample;
   for (const auto& [hash, row] : hashed) {
     sample.hashes.push_back(hash);
-    for (Eigen::Index column = 0; column < columns; ++column) sample.values.push_back(block.at(row, column));
+    for (Eigen::Index column = 0; column < data.row_columns(); ++column) sample.values.push_back(block.at(row, column));
   }
   return sample;
 }
@@ -107,7 +108,7 @@ void describe(const StateData& data, const Block& block, Description& sum) {
       }
     }
   }
-  sum.sample = sample_of(block, data.row_columns());
+  sum.sample = sample_of(data, block);
 }
 
 // Scales the rows of a pass and finds their nodes.
@@ -243,8 +244,20 @@ void check_block(const StateData& data, const Block& block) {
   }
 }
 
+std::uint64_t fingerprint_of(const StateData& data, const Block& block) {
+  std::uint64_t sum = 0;
+  for (Eigen::Index row = block.span.begin; row < block.span.end; ++row) {
+    const auto place = static_cast<double>(row - block.span.begin);
+    std::uint64_t hash = row_hash(static_cast<std::uint64_t>(block.number), place);
+    for (Eigen::Index column = 0; column < data.row_columns(); ++column) hash = row_hash(hash, block.at(row, column));
+    sum += hash;
+  }
+  return sum;
+}
+
 BlockSum sum_block(const StateData& data, const Block& block) {
   BlockSum sum;
+  sum.fingerprint = fingerprint_of(data, block);
   if (data.step == Step::describe) describe(data, block, sum.description);
   if (data.step == Step::grow) grow(data, block, sum);
   if (data.step == Step::gather) gather(data, block, sum);
@@ -262,9 +275,10 @@ Sample& Sample::operator+=(const Sample& other) {
   if (hashes.empty()) return *this = other;
   const std::size_t columns = values.size() / hashes.size();
   Sample both;
+  both.most = most;
   std::size_t a = 0;
   std::size_t b = 0;
-  while (both.hashes.size() < most && (a < hashes.size() || b < other.hashes.size())) {
+  while (std::ssize(both.hashes) < most && (a < hashes.size() || b < other.hashes.size())) {
     const bool own = b == other.hashes.size() || (a < hashes.size() && hashes[a] <= other.hashes[b]);
     const Sample& from = own ? *this : other;
     std::size_t& at = own ? a : b;

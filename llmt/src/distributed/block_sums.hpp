@@ -32,13 +32,12 @@ struct Block {
 
 /// The rows with the smallest hashes of their block and place in it: a sample that is the same however sums are merged.
 struct Sample {
-  static constexpr std::size_t most = 16384;
-
+  Eigen::Index most = 0;              ///< rows that are kept: Options::sample_rows
   std::vector<std::uint64_t> hashes;  ///< ascending
   std::vector<double> values;         ///< one row after the other: inputs, output, weight if there is one
 
   Sample& operator+=(const Sample& other);
-  static auto fields(auto& self) { return std::tie(self.hashes, self.values); }
+  static auto fields(auto& self) { return std::tie(self.most, self.hashes, self.values); }
 };
 
 /// What describes the columns, over the rows whose weight is not 0.
@@ -77,6 +76,7 @@ struct BranchRows {
 
 /// All sums of a block, of which a step of the fit fills a part.
 struct BlockSum {
+  std::uint64_t fingerprint = 0;  ///< of the rows: another one if a value changes or a row moves
   Description description;
   Extent root_residual;
   std::map<Eigen::Index, NodeSums> nodes;
@@ -84,7 +84,7 @@ struct BlockSum {
   JointSums joint;
 
   static auto fields(auto& self) {
-    return std::tie(self.description, self.root_residual, self.nodes, self.branches, self.joint);
+    return std::tie(self.fingerprint, self.description, self.root_residual, self.nodes, self.branches, self.joint);
   }
 };
 

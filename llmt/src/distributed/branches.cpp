@@ -157,6 +157,10 @@ State advance(const State& state, Sums sums, const Progress& progress, int max_t
   }
   BlockSum total = std::move(given->runs.front().sums).total(next);
   sums = Sums();
+  if (data.passes == 0) data.fingerprint = total.fingerprint;
+  if (data.fingerprint != total.fingerprint) {
+    throw std::runtime_error("llmt::distributed::advance: the rows are not those of the first pass: the table changed");
+  }
   data.blocks = next;
   ++data.passes;
   // Before the root's model is known, its residuals have no range.
@@ -165,8 +169,7 @@ State advance(const State& state, Sums sums, const Progress& progress, int max_t
   if (has_root_model) data.root_residual = total.root_residual;
   if (data.step == Step::describe) {
     take_description(data, total.description);
-    const bool is_small = data.rows <= std::max<Eigen::Index>(data.options.branch_rows, Sample::most);
-    if (!is_small) take_sample(data, total.description.sample, progress, max_threads);
+    if (data.rows > data.options.branch_rows) take_sample(data, total.description.sample, progress, max_threads);
   }
   if (data.step == Step::grow) take_nodes(data, std::move(total.nodes));
   if (data.step == Step::gather) take_branches(data, std::move(total.branches), progress, max_threads);

@@ -36,14 +36,14 @@ KeptOptions kept_options(const Options& options) {
           fmt::format("llmt::distributed::start: {} is not possible beyond one memory; {}", option, instead));
     }
   };
-  if (options.branch_rows < 100) {
+  const auto require_at_least = [](Eigen::Index least, Eigen::Index value, const char* name) {
+    if (value >= least) return;
     throw std::invalid_argument(
-        fmt::format("llmt::distributed::start: branch_rows is {}, it must be at least 100", options.branch_rows));
-  }
-  if (options.block_rows < 1) {
-    throw std::invalid_argument(
-        fmt::format("llmt::distributed::start: block_rows is {}, it must be at least 1", options.block_rows));
-  }
+        fmt::format("llmt::distributed::start: {} is {}, it must be at least {}", name, value, least));
+  };
+  require_at_least(100, options.sample_rows, "sample_rows");
+  require_at_least(100, options.branch_rows, "branch_rows");
+  require_at_least(1, options.block_rows, "block_rows");
   refuse(fit.rule != GrowthRule::rd, "the growth rule", "take rd, or fit a sample that fits into memory");
   refuse(fit.expert.search == SplitSearch::exact, "exact search", "the top of the tree is searched by bins");
   refuse(fit.terms != LocalTerms::linear, "a quadratic local model", "take linear ones, or products as columns");
@@ -54,7 +54,8 @@ KeptOptions kept_options(const Options& options) {
   refuse(!fit.split_inputs.empty(), "a list of split_inputs", "leave columns out of the table");
   refuse(!fit.regression_inputs.empty(), "a list of regression_inputs", "leave columns out of the table");
   KeptOptions kept;
-  kept.branch_rows = options.branch_rows;
+  kept.branch_rows = std::max(options.branch_rows, options.sample_rows);
+  kept.sample_rows = options.sample_rows;
   kept.block_rows = options.block_rows;
   kept.max_leaves = fit.max_leaves;
   kept.min_leaf_samples = fit.min_leaf_samples;

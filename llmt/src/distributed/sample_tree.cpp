@@ -12,8 +12,10 @@
 #include <utility>
 
 #include "distributed/block_sums.hpp"
+#include "distributed/top_model.hpp"
 #include "llmt/fit.hpp"
 #include "partition/leaf_validities.hpp"
+#include "stream/sums.hpp"
 
 namespace llmt::distributed {
 namespace {
@@ -77,16 +79,21 @@ Eigen::VectorXd solve_joint(const Eigen::MatrixXd& gram) {
   return equations.selfadjointView<Eigen::Lower>().ldlt().solve(gram.row(count).head(count).transpose());
 }
 
-// Akaike's final prediction error (1970): the error on new rows of a model that has `coefficients`.
-double expected_error(double squares, double rows, Eigen::Index coefficients) {
-  const auto count = static_cast<double>(coefficients);
+// Akaike's final prediction error (1970): the error on new rows of a model that has `count` coefficients.
+double expected_error(double squares, double rows, double count) {
   return count < rows ? squares / rows * (rows + count) / (rows - count) : std::numeric_limits<double>::infinity();
 }
 
-Eigen::Index coefficients_of(const Partition& tree) {
-  Eigen::Index count = 0;
-  for (const Node& node : tree.nodes) count += node.is_leaf() ? node.rank : 0;
-  return count;
+// The coefficients of a tree; its splits, each chosen among m, count as log m (Foster & George 1994).
+double count_of(const StateData& data, const Partition& tree, Eigen::Index coefficients) {
+  const double of_split = std::log(static_cast<double>(first_bins(data).back()));
+  return static_cast<double>(coefficients) + of_split * static_cast<double>(tree.num_leaves() - 1);
+}
+
+double count_of(const StateData& data, const Partition& tree) {
+  Eigen::Index coefficients = 0;
+  for (const Node& node : tree.nodes) coefficients += node.is_leaf() ? node.rank : 0;
+  return count_of(data, tree, coefficients);
 }
 
 // What the nodes say of the rows in their boxes.
@@ -143,6 +150,24 @@ Model joined(const StateData& data, const JointSums& sums, const Eigen::VectorXd
   }
   return Model(std::move(inputs), {{to_string(data.output_name), range.low, range.high}}, regressors,
                {std::move(tree)});
+}
+
+// Puts the linear model of the root in place of top and branches if that is expected to predict no worse.
+void take_root(StateData& data, JointSums& sums) {
+  TopNode& root = data.nodes.front();
+  if (root.fate != Fate::inner) return;
+  int rank = 0;
+  const Eigen::VectorXd change = solve(data.shape(), root.gram.data(), 0.0, rank);
+  const double squares = remaining(data.shape(), root.gram.data(), change);
+  const double error = expected_error(squares, data.weight, rank);
+  const double of_tree = count_of(data, data.result->partitions().front());
+  if (error > expected_error(sums.tree_squares, data.weight, of_tree)) return;
+  root.fate = Fate::leaf;
+  root.held_out_rmse = data.scale(data.inputs()) * std::sqrt(error);
+  data.nodes.resize(1);
+  data.result = assemble(data);
+  data.model = to_text(to_json(*data.result));
+  sums.tree_squares = squares;
 }
 
 }  // namespace
@@ -228,9 +253,11 @@ void take_joint(StateData& data, JointSums sums) {
   if (std::ssize(sums.leaf_rows) != tree_of(data).num_leaves()) {
     throw std::runtime_error("llmt::distributed::advance: the sums have not the leaves of the sample's tree");
   }
+  take_root(data, sums);
   const Eigen::VectorXd change = solve_joint(sums.gram);
-  const double error = expected_error(squares_after(sums.gram, change), data.weight, unknowns_of(data));
-  const Eigen::Index of_other = coefficients_of(data.result->partitions().front());
+  const double own = count_of(data, tree_of(data), unknowns_of(data));
+  const double error = expected_error(squares_after(sums.gram, change), data.weight, own);
+  const double of_other = count_of(data, data.result->partitions().front());
   if (change.allFinite() && error < expected_error(sums.tree_squares, data.weight, of_other)) {
     data.model = to_text(to_json(joined(data, sums, change)));
     data.is_blended = 1;

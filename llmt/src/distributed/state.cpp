@@ -15,7 +15,7 @@ namespace llmt::distributed {
 namespace {
 
 constexpr std::string_view format = "LLMTSUMS";
-constexpr std::uint32_t version = 2;
+constexpr std::uint32_t version = 3;
 
 struct Header {
   char format[8];
@@ -109,7 +109,7 @@ void check_option(Eigen::Index value, Eigen::Index last) { require(value >= 0 &&
 
 void check_state(const StateData& data) {
   const KeptOptions& options = data.options;
-  require(options.branch_rows > 0 && options.block_rows > 0, "an option");
+  require(options.sample_rows > 0 && options.branch_rows >= options.sample_rows && options.block_rows > 0, "an option");
   check_option(options.pruning, static_cast<Eigen::Index>(Pruning::weakest_link));
   check_option(options.validity, static_cast<Eigen::Index>(ValidityChoice::blend));
   check_option(options.sparse, static_cast<Eigen::Index>(SparseChoice::always));

@@ -36,6 +36,7 @@ inline std::vector<std::string> to_strings(const std::vector<Text>& from) {
 /// Options that a branch may have, as numbers.
 struct KeptOptions {
   Eigen::Index branch_rows = 0;
+  Eigen::Index sample_rows = 0;  ///< no more than branch_rows
   Eigen::Index block_rows = 0;
   Eigen::Index max_leaves = 0;
   Eigen::Index min_leaf_samples = 0;
@@ -55,9 +56,10 @@ struct KeptOptions {
   std::vector<double> shrinkages;
 
   static auto fields(auto& self) {
-    return std::tie(self.branch_rows, self.block_rows, self.max_leaves, self.min_leaf_samples, self.significance,
-                    self.pruning, self.validity, self.sparse, self.estimation, self.folds, self.fold_kind, self.seed,
-                    self.intervals, self.weighted, self.widths, self.jumps, self.ridges, self.shrinkages);
+    return std::tie(self.branch_rows, self.sample_rows, self.block_rows, self.max_leaves, self.min_leaf_samples,
+                    self.significance, self.pruning, self.validity, self.sparse, self.estimation, self.folds,
+                    self.fold_kind, self.seed, self.intervals, self.weighted, self.widths, self.jumps, self.ridges,
+                    self.shrinkages);
   }
 };
 
@@ -105,6 +107,7 @@ struct StateData {
   Eigen::Index passes = 0;
   Eigen::Index blocks = 0;  ///< of the table, and its rows; known after the first pass
   Eigen::Index rows = 0;
+  std::uint64_t fingerprint = 0;                  ///< of the rows: BlockSum::fingerprint
   double weight = 0.0;                            ///< of all rows; their number where they have no weights
   double weight_scale = 1.0;                      ///< what given weights are multiplied by
   std::vector<Extent> range;                      ///< of every input, and of the output
@@ -135,9 +138,9 @@ struct StateData {
 
   static auto fields(auto& self) {
     return std::tie(self.options, self.input_names, self.output_name, self.levels, self.step, self.passes, self.blocks,
-                    self.rows, self.weight, self.weight_scale, self.range, self.mean, self.scale, self.edges,
-                    self.level_weight, self.nodes, self.asked, self.root_residual, self.model, self.sample_model,
-                    self.sample_rmse, self.is_blended);
+                    self.rows, self.fingerprint, self.weight, self.weight_scale, self.range, self.mean, self.scale,
+                    self.edges, self.level_weight, self.nodes, self.asked, self.root_residual, self.model,
+                    self.sample_model, self.sample_rmse, self.is_blended);
   }
 };
 

@@ -24,6 +24,7 @@ void check_block_sum(const SumsData& data, const BlockSum& sum) {
   require_of_sums(has(description.range, describes ? columns : 0) && has(description.total, describes ? columns : 0) &&
                       has(description.missing, describes ? data.inputs : 0) && description.rows >= 0 &&
                       has(description.sample.values, std::ssize(description.sample.hashes) * data.columns) &&
+                      std::ssize(description.sample.hashes) <= description.sample.most &&
                       std::ranges::is_sorted(description.sample.hashes),
                   "the description of the columns");
   require_of_sums(sum.nodes.empty() || data.step == Step::grow, "a node");

@@ -162,6 +162,12 @@ Model assemble(const StateData& data) {
       partition.nodes[at].missing_left = data.nodes[from.left].weight / from.weight;
     }
   }
+  // fit() may count equal rows as one, or a row as its weight.
+  for (std::size_t at = data.nodes.size(); at-- > 0;) {
+    const TopNode& from = data.nodes[at];
+    if (from.fate != Fate::inner) continue;
+    partition.nodes[at].samples = partition.nodes[from.left].samples + partition.nodes[from.right].samples;
+  }
   partition.outer_slope = agreed_slope(partition);
   if (data.root_residual.low <= data.root_residual.high) {
     partition.residual_range = Eigen::RowVector2d(data.root_residual.low, data.root_residual.high);

@@ -1,5 +1,4 @@
-// Weights, categories and the tree of the sample beyond one memory, beside repeated rows, fit() in memory, and brute
-// force.
+// Weights, categories and the tree of the sample, beside repeated rows, fit() in memory, and brute force.
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
@@ -56,7 +55,7 @@ FitOptions crisp() {
 }
 
 Options with(Eigen::Index branch_rows, bool weighted, bool has_levels) {
-  Options options{.branch_rows = branch_rows, .block_rows = rows_of_block, .weighted = weighted, .fit = crisp()};
+  Options options{branch_rows, branch_rows, rows_of_block, weighted, {}, crisp()};
   if (has_levels) options.levels = {{}, {}, {"v", "w", "x", "y", "z"}};
   return options;
 }
@@ -84,6 +83,8 @@ double rmse_on(const Model& model, const Weighed& table) { return rmse(model.pre
 
 TEST(WeightsBeyondMemory, AWeightOfKIsKTimesTheRow) {
   Weighed table = made(3000, 1);
+  // Few different values, so that the bins of both samples are the same.
+  table.inputs = (8.0 * table.inputs).array().round() / 8.0;
   Random random(2);
   table.weights.resize(3000);
   for (double& weight : table.weights) weight = std::floor(random.uniform(0.0, 4.0));  // 0 to 3
@@ -98,6 +99,7 @@ TEST(WeightsBeyondMemory, AWeightOfKIsKTimesTheRow) {
   repeated_options.block_rows = 3 * rows_of_block;
   const State repeated = run(table, repeated_options, repeat);
   ASSERT_GE(weighed.counts().top_leaves, 3);
+  ASSERT_FALSE(weighed.counts().is_of_sample);
   EXPECT_EQ(weighed.counts().top_leaves, repeated.counts().top_leaves);
   EXPECT_EQ(weighed.counts().rows, (table.weights.array() > 0.0).count());
   const Eigen::MatrixXd one = weighed.model().predict(table.inputs);
@@ -105,10 +107,8 @@ TEST(WeightsBeyondMemory, AWeightOfKIsKTimesTheRow) {
   EXPECT_LE((one - other).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_NEAR(weighed.counts().held_out_rmse, repeated.counts().held_out_rmse, 1e-9);
   // Without the weights it is another model.
-  EXPECT_GT((run({table.inputs, table.output, {}}, with(700, false, false)).model().predict(table.inputs) - one)
-                .cwiseAbs()
-                .maxCoeff(),
-            1e-3);
+  const State plain = run({table.inputs, table.output, {}}, with(700, false, false));
+  EXPECT_GT((plain.model().predict(table.inputs) - one).cwiseAbs().maxCoeff(), 1e-3);
 }
 
 TEST(WeightsBeyondMemory, OfPrecisionsOnlyTheRatiosMatter) {
