@@ -202,13 +202,16 @@ void demand_certainty(Missing& missing) {
 }
 
 std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms) {
+  constexpr double certain = 2.0;  // standard errors
   std::set<std::size_t> beyond;
   for (const FoundTerm& found : missing.found) {
     const ModelTerm& term = terms[found.term];
     for (Eigen::Index k = 0; k < found.constants.size() && !term.inner_state.empty(); ++k) {
       const std::vector<double>& tried = term.constants[static_cast<std::size_t>(k)].tried;
       const bool is_below = k == 0 && found.constants(k) <= tried.front();
-      if (is_below || found.constants(k) >= tried.back()) beyond.insert(found.term);
+      const double error = found.values[static_cast<std::size_t>(found.coefficients.size() + k)].standard_error;
+      const double margin = k > 0 ? certain * error : 0.0;
+      if (is_below || !(found.constants(k) + margin < tried.back())) beyond.insert(found.term);  // NaN at the limit
     }
   }
   return beyond;

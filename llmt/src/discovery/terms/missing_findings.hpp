@@ -45,7 +45,8 @@ void decide(Missing& missing, bool in_time, const std::vector<bool>& cancelling 
 void demand_certainty(Missing& missing);
 
 /// The indices in `terms` of those terms of a state that were found with a frequency at an end of those tried, or with
-/// the largest damping ratio tried or more: a filter, no machine, has such constants.
+/// a damping ratio that is not below the largest tried by two standard errors: a filter, no machine, has such
+/// constants.
 std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms);
 
 /// The indices in `terms` of those that were found with a width below 4 standard deviations of the errors of their
