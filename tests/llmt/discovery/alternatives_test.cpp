@@ -51,8 +51,9 @@ Missing answer_of(const Log& log, const std::string& family, double after) {
   Missing missing;
   missing.answer = Answer::named;
   missing.found = {found};
-  missing.held_out = {0};
-  missing.corrected = Eigen::MatrixXd::Constant(rows, 1, 1e3);  // far off, where it is not said otherwise
+  for (Eigen::Index row = 0; row < rows; ++row) missing.held_out.push_back(row);
+  missing.searched = missing.held_out;
+  missing.corrected = (log.measured.values.array() + 1e-3).matrix();  // better than any, where it is not said otherwise
   missing.gaps = {{.output = "y", .before = log.spread(), .after = after, .noise_floor = noise}};
   return missing;
 }
@@ -94,14 +95,24 @@ TEST(Alternatives, PlainTermsAreTakenWhereTheyLeaveClearlyLessOrNoMoreWithFewerN
     for (Missing* missing : {&clearly_more, &more}) missing->found[0].coefficients.resize(0);
     EXPECT_EQ(family_taken(log, clearly_more, plain), "square");
     EXPECT_EQ(family_taken(log, more, plain), "saturation");
-    // As good on the rows that both set aside: a rival.
-    Missing as_good = answer_of(log, "saturation", 0.95 * left);
-    as_good.held_out = of_square.held_out;
-    as_good.corrected = of_square.corrected;
-    const Missing doubted = taken(log, as_good, plain);
-    ASSERT_EQ(doubted.found[0].rivals.size(), 1u);
-    EXPECT_EQ(doubted.found[0].rivals[0].what, "square x");
-    EXPECT_EQ(doubted.answer, Answer::indistinguishable);
+    // As good on the rows that both set aside, by the margin of a rival for so few rows and by that of all.
+    const auto better_by = [&](double share) {
+      Missing found = answer_of(log, "saturation", 0.95 * left);
+      found.held_out = of_square.held_out;
+      found.searched = of_square.searched;
+      found.corrected = log.measured.values - (1.0 - share) * (log.measured.values - of_square.corrected);
+      return taken(log, found, plain);
+    };
+    const Missing square = better_by(0.0);
+    EXPECT_EQ(square.found[0].family, "square");
+    ASSERT_EQ(square.found[0].rivals.size(), 1u);
+    EXPECT_EQ(square.found[0].rivals[0].what, "saturation");
+    EXPECT_EQ(square.answer, Answer::indistinguishable);
+    const Missing saturation = better_by(0.04);
+    EXPECT_EQ(saturation.found[0].family, "saturation");
+    ASSERT_EQ(saturation.found[0].rivals.size(), 1u);
+    EXPECT_EQ(saturation.found[0].rivals[0].what, "square x");
+    EXPECT_TRUE(better_by(0.1).found[0].rivals.empty());
   }
 }
 

@@ -136,13 +136,13 @@ Explained without_needless(const Scoring& scoring, Explained found) {
   return found;
 }
 
-// Fewer and simpler terms that do as well as `set`, by the margin of a rival, if another family stands in the place of
-// one: with a hinge at the other side, the line and the offset beside it go. Empty: there are none.
+// Fewer and simpler terms that do better than `set` if another family stands in the place of one: with a hinge at the
+// other side, the line and the offset beside it go. Empty: there are none.
 Set fewer(const Scoring& scoring, const Set& set, const std::string& family, const SearchOptions& options) {
   for (const std::string& other : causes_of(scoring)) {
     if (other == family) continue;
     const Explained rival = without_needless(scoring, replaced(scoring, set, family, other, options));
-    if (rival.set.size() < set.size() && rival.score <= scoring.score(set) + options.rival_margin &&
+    if (rival.set.size() < set.size() && rival.score <= scoring.score(set) &&
         sum_of_complexities(scoring, rival.set) < sum_of_complexities(scoring, set)) {
       return rival.set;
     }

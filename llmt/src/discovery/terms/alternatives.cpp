@@ -77,6 +77,19 @@ RivalTerms in_its_place(const FoundTerm& term, const std::vector<FoundTerm>& bes
   return rival;
 }
 
+// The plain terms of `place`, with those of `other` as rivals.
+Missing with_rivals(const std::vector<std::string>& place, Missing plain, const Missing& other) {
+  const std::vector<FoundTerm> beside = plain.found;
+  for (FoundTerm& term : plain.found) {
+    if (term.inputs != place) continue;
+    const RivalTerms rival = in_its_place(term, beside, other);
+    if (rival.what.empty()) continue;
+    term.rivals.insert(term.rivals.begin(), rival);
+    if (plain.answer == Answer::named) plain.answer = Answer::indistinguishable;
+  }
+  return plain;
+}
+
 // Terms with a constant, of `place`, for which those of `plain` could stand. If these are approximations, so may they
 // be.
 void doubt_searched(const std::vector<std::string>& place, const Missing& plain, bool holds, Missing& found) {
@@ -181,7 +194,15 @@ Missing Alternatives::plain_for_searched(Missing found) const {
     const bool has_fewer = fitted_numbers(plain) < fitted_numbers(found);
     if ((holds && ratio < clearly_less) || (has_fewer && ratio < 1.0)) {
       found = std::move(plain);
-    } else if (evidence_against(plain, found, *measured_) <= options_->search.rival_margin) {
+      continue;
+    }
+    const double margin = options_->search.rival_margin;
+    const double evidence = evidence_against(plain, found, *measured_);
+    // The margin is of the rows searched, the evidence of those set aside.
+    const double of_aside = static_cast<double>(found.held_out.size()) / static_cast<double>(found.searched.size());
+    if (holds && fitted_numbers(plain) <= fitted_numbers(found) && evidence <= of_aside * margin) {
+      found = with_rivals(place, std::move(plain), found);
+    } else if (evidence <= margin) {
       doubt_searched(place, plain, holds, found);
     }
   }

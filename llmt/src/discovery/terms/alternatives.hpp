@@ -39,9 +39,9 @@ class Alternatives {
   Missing causes_for_shapes(Missing found) const;
 
   /// What a term with a constant misses makes neighbours alike, so that few samples count and two plain terms in its
-  /// place do not seem to be worth their cost. Where terms without constants leave clearly less, or no more with fewer
-  /// fitted numbers, they are the answer. Where they do as well by the margin of a rival, they are one of the term; it
-  /// is tentative if they are, because then it may be an approximation too.
+  /// place do not seem to be worth their cost. Terms without constants are the answer where they leave clearly less, or
+  /// no more with fewer fitted numbers, or, all of them certain and with no more numbers, as much by the margin of a
+  /// rival. Where uncertain ones do as well by that margin, the term is tentative: it may be an approximation too.
   Missing plain_for_searched(Missing found) const;
 
  private:

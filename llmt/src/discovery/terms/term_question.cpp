@@ -64,78 +64,57 @@ Eigen::MatrixXd beside(const Eigen::MatrixXd& left, const Eigen::MatrixXd& right
   return both;
 }
 
-// The residuals without some terms of the fit, and everything else that may explain them.
-TrialGround ground_without(const TermModel& model, const TermData& data, const TermFit& fit,
-                           const std::vector<std::size_t>& gone) {
+// The residuals without term t of the fit, and everything else that may explain them.
+TrialGround ground_without(const TermModel& model, const TermData& data, const TermFit& fit, std::size_t t) {
   const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
+  const PlacedTerm& placed = fit.placed[t];
   TrialGround ground{scaled_residuals(model, data, fit.parameters, fit.placed),
                      baseline_jacobian(model, data, fit.parameters, fit.placed)};
+  ground.residuals += stacked_signature(model, data, placed, simulated) * placed.coefficients;
   for (std::size_t k = 0; k < fit.placed.size(); ++k) {
-    const Eigen::MatrixXd signature = stacked_signature(model, data, fit.placed[k], simulated);
-    if (std::ranges::find(gone, k) != gone.end()) {
-      ground.residuals += signature * fit.placed[k].coefficients;
-    } else {
-      ground.nuisance = beside(ground.nuisance, signature);
-    }
+    if (k != t) ground.nuisance = beside(ground.nuisance, stacked_signature(model, data, fit.placed[k], simulated));
   }
   return ground;
 }
 
-// In time, the constants of a rival are those with which it stands best in the place of a term of the same inputs, or
-// of all of them together: beside them it would only follow the noise. Independent rows find rivals in the first round.
+// In time, the constants of a simpler rival are those with which it stands best in the place of a term of the same
+// inputs: beside that term it would only follow the noise. Independent rows find rivals in the first round.
 class Rivals {
  public:
   Rivals(const TermModel& model, const TermData& data, const TermFit& fit, const std::vector<std::size_t>& outliers)
       : model_(&model), fit_(&fit), kept_(without_samples(data, outliers)) {
     if (data.stretches.empty()) return;
-    for (std::size_t k = 0; k < fit.placed.size(); ++k) {
-      const std::vector<std::size_t> all = of_the_place_of(k);
-      places_.push_back({{k}, ground_without(model, kept_, fit, {k}), all.size() > 1});
-      if (all.size() > 1 && all.front() == k) places_.push_back({all, ground_without(model, kept_, fit, all), true});
-    }
+    for (std::size_t k = 0; k < fit.placed.size(); ++k) grounds_.push_back(ground_without(model, kept_, fit, k));
   }
 
   // Term t in the place of each less simple term of its inputs; of each as simple as well where one could stand for
-  // several, as a hinge does for a hinge at the other side and a line, or Stribeck's peak for two that saturate.
+  // several, as a hinge does for a hinge at the other side and a line.
   std::vector<PlacedTerm> options(std::size_t t, Eigen::Index output, const Eigen::MatrixXd& simulated) const {
     std::vector<PlacedTerm> all;
-    for (const PlaceOfTerms& place : places_) {
+    for (std::size_t k = 0; k < grounds_.size(); ++k) {
+      const PlacedTerm& placed = fit_->placed[k];
+      const ModelTerm& term = model_->terms()[placed.term];
       const ModelTerm& other = model_->terms()[t];
-      int most = 0;
-      for (const std::size_t k : place.terms) most = std::max(most, model_->terms()[fit_->placed[k].term].complexity);
-      const PlacedTerm& placed = fit_->placed[place.terms.front()];
-      const bool is_there = std::ranges::any_of(place.terms, [&](std::size_t k) { return fit_->placed[k].term == t; });
-      if (placed.output != output || model_->terms()[placed.term].inputs != other.inputs || is_there) continue;
-      if (other.complexity > (place.is_of_several ? most : most - 1)) continue;
-      std::ranges::move(best_constants(*model_, kept_, place.ground, t, output, simulated, {}),
-                        std::back_inserter(all));
+      if (placed.output != output || term.inputs != other.inputs || placed.term == t) continue;
+      const int limit = is_one_of_several(placed) ? term.complexity : term.complexity - 1;
+      if (other.complexity > limit) continue;
+      std::ranges::move(best_constants(*model_, kept_, grounds_[k], t, output, simulated, {}), std::back_inserter(all));
     }
     return all;
   }
 
  private:
-  struct PlaceOfTerms {
-    std::vector<std::size_t> terms;
-    TrialGround ground;  // without them
-    bool is_of_several;  // whether there are others of the same inputs and output
-  };
-
-  std::vector<std::size_t> of_the_place_of(std::size_t k) const {
-    std::vector<std::size_t> all;
-    for (std::size_t other = 0; other < fit_->placed.size(); ++other) {
-      const PlacedTerm& own = fit_->placed[other];
-      if (own.output == fit_->placed[k].output &&
-          model_->terms()[own.term].inputs == model_->terms()[fit_->placed[k].term].inputs) {
-        all.push_back(other);
-      }
-    }
-    return all;
+  bool is_one_of_several(const PlacedTerm& placed) const {
+    return std::ranges::any_of(fit_->placed, [&](const PlacedTerm& other) {
+      return other.term != placed.term && other.output == placed.output &&
+             model_->terms()[other.term].inputs == model_->terms()[placed.term].inputs;
+    });
   }
 
   const TermModel* model_;
   const TermFit* fit_;
   TermData kept_;
-  std::vector<PlaceOfTerms> places_;
+  std::vector<TrialGround> grounds_;
 };
 
 }  // namespace
@@ -208,7 +187,7 @@ bool retry_constants(const TermModel& model, const TermData& data, TermFit& fit)
     const TermConstant& constant = model.terms()[placed.term].constants.front();
     const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
     const std::vector<PlacedTerm> best =
-        best_constants(model, data, ground_without(model, data, fit, {t}), placed.term, placed.output, simulated, {});
+        best_constants(model, data, ground_without(model, data, fit, t), placed.term, placed.output, simulated, {});
     if (best.empty()) continue;
     const double moved = std::abs(best.front().constants(0) - placed.constants(0));
     const double step = spacing(constant.tried, placed.constants(0));
@@ -225,7 +204,7 @@ void set_trial_errors(const TermModel& model, const TermData& data, TermFit& fit
     const PlacedTerm& placed = fit.placed[t];
     if (placed.constants.size() == 0 || model.terms()[placed.term].constants.front().smooth) continue;
     fit.errors[t](placed.coefficients.size()) =
-        trial_error(model, data, ground_without(model, data, fit, {t}), placed, model.simulated(fit.parameters));
+        trial_error(model, data, ground_without(model, data, fit, t), placed, model.simulated(fit.parameters));
   }
 }
 
