@@ -58,8 +58,9 @@ def start(
         Names of the inputs.
     target : str
     branch_rows : int
-        Branches of the tree with at most so many rows are brought into one memory and fitted there. A table that has
-        no more rows becomes the model of `LocalLinearTreeRegressor.fit`, to the byte. No fewer than `sample_rows`.
+        Branches of the tree with at most this number of rows are brought into one memory and fitted there. A table
+        that has no more rows becomes the model of `LocalLinearTreeRegressor.fit`, to the byte. No fewer than
+        `sample_rows`.
     sample_rows : int
         Rows of the sample that the first pass brings into one memory: a first tree is grown from it.
     block_rows : int

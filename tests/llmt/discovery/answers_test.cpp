@@ -173,6 +173,10 @@ TEST(Answers, TermsOfInputsThatLeaveAsLittleAreRivalsOfAGain) {
   EXPECT_EQ(rival.answer, Answer::indistinguishable);
   EXPECT_TRUE(inputs_for_gain(found, leaving(1.2, {inertia, friction, drag}), measured, 6.0).found[0].rivals.empty());
 
+  // Nothing is as good as an answer without an error.
+  EXPECT_EQ(inputs_for_gain(leaving(0.0, {gain, drag}), leaving(1.0, {inertia}), measured, 6.0).found[0].family,
+            "gain");
+
   // With fewer terms they are the answer, unless it is uncertain.
   EXPECT_EQ(inputs_for_gain(found, leaving(1.1, {inertia}), measured, 6.0).found[0].family, "linear");
   EXPECT_EQ(inputs_for_gain(found, leaving(1.2, {inertia}), measured, 6.0).found[0].family, "gain");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "discovery/terms/missing_findings.hpp"
@@ -57,7 +58,11 @@ double evidence_against(const Missing& other, const Missing& found, const Measur
       rows += 1.0;
     }
     const double samples = found.time.independent_share * rows / static_cast<double>(found.time.rows_per_sample);
-    if (left > 0.0) evidence += 0.5 * samples * (left_by_other / left - 1.0);
+    if (left > 0.0) {
+      evidence += 0.5 * samples * (left_by_other / left - 1.0);
+    } else if (left_by_other > 0.0) {
+      return std::numeric_limits<double>::infinity();  // `found` is exact
+    }
   }
   return evidence;
 }

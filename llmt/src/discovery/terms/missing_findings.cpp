@@ -241,7 +241,8 @@ std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::ve
 
 bool is_drift(const Missing& missing) {
   constexpr double fewest = 10.0;
-  return missing.time.in_time && missing.found.empty() &&
+  constexpr double slow = 0.5;  // independent share; rows may also be few
+  return missing.time.in_time && missing.found.empty() && missing.time.independent_share < slow &&
          missing.time.independent_share * static_cast<double>(missing.time.samples) < fewest;
 }
 
