@@ -291,5 +291,20 @@ TEST(InTime, FamiliesAreChosenByName) {
   EXPECT_THROW(of_families(standard_terms(log.inputs), {}, {"lineal"}), std::invalid_argument);
 }
 
+// The acceleration of a mass is known from its position, its velocity and the time of a sine, but for its error:
+// samples that are alike in all inputs have like errors, and so have their forces.
+TEST(InTime, ErrorsOfAnInputAreNoStructure) {
+  int complete = 0;
+  constexpr int logs = 12;
+  for (std::uint64_t seed = 1; seed <= logs; ++seed) {
+    MassLog log = log_of(seed, 1200, 0.01, 0.0, nothing);
+    Noise noise(100 + seed);
+    for (Eigen::Index i = 0; i < log.inputs.values.rows(); ++i) log.inputs.values(i, 2) += 0.1 * noise.normal();
+    log.simulated = 3.0 * log.inputs.values.col(2) + log.inputs.values.col(1);
+    complete += missing_from(log).answer == Answer::nothing_missing;
+  }
+  EXPECT_EQ(complete, logs);
+}
+
 }  // namespace
 }  // namespace time_test

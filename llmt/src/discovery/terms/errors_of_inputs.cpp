@@ -46,7 +46,10 @@ ErrorsOfInputs errors_of_inputs(const TermModel& model, const Inputs& inputs, co
       is_described ? "what they add to the deviations was taken out"
                    : "what they add to the deviations is not known, because no function of the inputs describes the "
                      "simulation"));
-  if (is_described) errors.noise = std::move(noise);
+  if (is_described) {
+    errors.noise = std::move(noise);
+    errors.deviations = covariance.diagonal().cwiseSqrt();
+  }
   return errors;
 }
 

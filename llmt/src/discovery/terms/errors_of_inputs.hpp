@@ -12,6 +12,7 @@ namespace llmt::discovery {
 
 struct ErrorsOfInputs {
   std::unique_ptr<const InputNoise> noise;  ///< none where no errors are known, or cannot be taken out
+  Eigen::VectorXd deviations;               ///< standard deviations, one an input; empty where noise is none
   std::vector<std::string> uncorrected;     ///< labels of terms whose estimates could not be corrected
   std::vector<std::string> notes;
 };

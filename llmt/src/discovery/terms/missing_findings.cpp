@@ -123,14 +123,20 @@ void describe_limits(const Settled& settled, const TermData& data, Missing& miss
 }
 
 std::vector<Structure> structure_beside(const TermModel& model, const TermData& data, const Inputs& inputs,
-                                        const Missing& missing) {
+                                        const Eigen::VectorXd& errors, const Missing& missing) {
   constexpr double surprising = 5e-4;
   constexpr double material = 0.05;
   // More than a quarter of what is left: no noise hides what the terms miss, however little of the gap it is.
   constexpr double dominant = 0.25;
   // Signals of a machine always hold a little more than what is asked for.
   constexpr double immaterial = 0.01;
-  const Eigen::MatrixXd samples = means(inputs.values, data.samples);
+  Eigen::MatrixXd samples = means(inputs.values, data.samples);
+  if (!data.stretches.empty()) {
+    for (Eigen::Index j = 0; j < errors.size(); ++j) {
+      if (!(errors(j) > 0.0)) continue;
+      samples.col(j) = between_neighbours(samples.col(j), data.stretches, data.independent_share);
+    }
+  }
   std::vector<Structure> all;
   for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
     const Eigen::VectorXd left = data.measured.col(o) - means(missing.corrected.col(o), data.samples);

@@ -27,9 +27,11 @@ void describe_findings(const TermModel& model, const Settled& settled, Missing& 
 /// Missing::visible and not_testable.
 void describe_limits(const Settled& settled, const TermData& data, Missing& missing);
 
-/// Deviations that neighbouring rows share, so that they are not noise, as far as they are material.
+/// Deviations that neighbouring rows share, so that they are not noise, as far as they are material. `errors`: standard
+/// deviations of the errors of the inputs, empty where none are known. In time, neighbours in an input with errors are
+/// found by between_neighbours() of it.
 std::vector<Structure> structure_beside(const TermModel& model, const TermData& data, const Inputs& inputs,
-                                        const Missing& missing);
+                                        const Eigen::VectorXd& errors, const Missing& missing);
 
 /// Missing::answer, and which terms are confirmed:
 ///

@@ -110,7 +110,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   const Eigen::MatrixXd nominal = model.predict(start, {});
   missing.before = model.predict(baseline.parameters, {});
   missing.corrected = model.predict(settled.fit.parameters, settled.fit.placed);
-  missing.structure = structure_beside(model, kept, inputs, missing);
+  missing.structure = structure_beside(model, kept, inputs, errors.deviations, missing);
   // Independent rows with errors of the inputs deviate like their neighbours: the errors alone do that.
   if (errors.noise && !in_time) missing.structure.clear();
   TermData aside = data_of(split.held_out, measured);

@@ -118,4 +118,21 @@ StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorX
   return best;
 }
 
+Eigen::VectorXd between_neighbours(const Eigen::VectorXd& signal, const std::vector<Eigen::Index>& stretches,
+                                   double independent_share) {
+  const auto places = static_cast<Eigen::Index>(std::ceil(1.0 / independent_share));
+  Eigen::VectorXd between = signal;
+  for (Eigen::Index i = 0; i < signal.size(); ++i) {
+    double sum = 0.0;
+    int count = 0;
+    for (const Eigen::Index k : {i - places, i + places}) {
+      if (k < 0 || k >= signal.size() || stretches[k] != stretches[i]) continue;
+      sum += signal(k);
+      ++count;
+    }
+    if (count > 0) between(i) = sum / count;
+  }
+  return between;
+}
+
 }  // namespace llmt::discovery

@@ -21,4 +21,13 @@ struct StructureLeft {
 StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors,
                              const std::vector<Eigen::Index>& stretches = {}, double independent_share = 1.0);
 
+/// A signal as the samples beside each sample show it: the mean of those `ceil(1 / independent_share)` places before
+/// and after, of the same stretch; of one where there is one, and the sample's own value where there is none.
+///
+/// An error of an input moves the simulation at its sample, and so the deviation there. Samples that the error makes
+/// alike in this input, seen beside the others, then have like deviations though nothing is missing. Samples beside it
+/// have other errors (a lagged value as an instrument: Fuller 1987, section 1.4).
+Eigen::VectorXd between_neighbours(const Eigen::VectorXd& signal, const std::vector<Eigen::Index>& stretches,
+                                   double independent_share);
+
 }  // namespace llmt::discovery
