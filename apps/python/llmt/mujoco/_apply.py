@@ -25,11 +25,14 @@ def _functions() -> dict[str, Callable[..., Any]]:
         "absolute": abs,
         "sign": np.sign,
         "signed_square": lambda x: x * abs(x),
+        "signed_root": lambda x: np.sign(x) * np.sqrt(abs(x)),
         "step": lambda x, c: float(x > c),
         "hinge": lambda x, c: max(0.0, x - c),
         "hinge_below": lambda x, c: max(0.0, c - x),
         "tanh": lambda x, c: np.tanh(x / c),
         "asinh": lambda x, c: np.arcsinh(x / c),
+        "limit": lambda x, c: max(-c, min(c, x)),
+        "dead_band": lambda x, c: np.sign(x) * max(0.0, abs(x) - c),
         "stribeck": lambda x, c: np.sign(x) * np.exp(-((x / c) ** 2)),
     }
 

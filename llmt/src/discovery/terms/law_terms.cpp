@@ -1,4 +1,4 @@
-// Laws of machines, growth and friction, with one or two constants that are searched.
+// Laws of machines, growth, friction and actuators, with one or two constants that are searched.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -113,6 +113,23 @@ ModelTerm coulomb_stribeck(const InputView& input) {
   return term;
 }
 
+// What an actuator or a sensor that stops at +-c gives, and what one gives that begins beyond +-c.
+std::vector<ModelTerm> two_sided(const InputView& input) {
+  const std::string& x = input.name;
+  const double far = std::max(-input.low, input.high);
+  TermConstant inner = smooth("c", x, geometric(0.02 * far, 0.9 * far, 24));
+  inner.width = true;
+  return {law(input, "limit", fmt::format("max(-c, min(c, {}))", x), "slope", x, {inner}, "max(-($c), min($c, $1))",
+              [](const Eigen::ArrayXd& v, const Eigen::VectorXd& c) -> Eigen::ArrayXd {
+                return v.min(std::abs(c(0))).max(-std::abs(c(0)));
+              }),
+          law(input, "dead_band", fmt::format("sign({0}) max(0, |{0}| - c)", x), "slope", x,
+              {smooth("c", x, geometric(0.02 * far, 0.9 * far, 24))}, "sign($1)*max(0, abs($1) - $c)",
+              [](const Eigen::ArrayXd& v, const Eigen::VectorXd& c) -> Eigen::ArrayXd {
+                return v.sign() * (v.abs() - c(0)).max(0.0);
+              })};
+}
+
 ModelTerm friction(std::string family, std::string location, std::string formula, std::vector<std::string> inputs,
                    std::string per, std::function<Eigen::ArrayXd(const Rows& rows)> load, Eigen::Index speed,
                    std::string code) {
@@ -141,7 +158,10 @@ std::vector<ModelTerm> law_terms(const InputView& input) {
     for (ModelTerm& term : hills(input)) terms.push_back(std::move(term));
     terms.push_back(power(input));
   }
-  if (changes_sign(input)) terms.push_back(coulomb_stribeck(input));
+  if (changes_sign(input)) {
+    terms.push_back(coulomb_stribeck(input));
+    for (ModelTerm& term : two_sided(input)) terms.push_back(std::move(term));
+  }
   return terms;
 }
 

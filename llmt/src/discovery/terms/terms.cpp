@@ -173,6 +173,9 @@ void add_functions(const InputView& input, std::vector<ModelTerm>& terms) {
       terms.push_back(function_term(
           input, "signed_square", fmt::format("{0} |{0}|", x), x + "^2", [](double v) { return v * std::abs(v); },
           "$1*abs($1)"));
+      terms.push_back(function_term(
+          input, "signed_root", fmt::format("sign({0}) sqrt(|{0}|)", x), x + "^0.5",
+          [](double v) { return std::copysign(std::sqrt(std::abs(v)), v); }, "sign($1)*sqrt(abs($1))"));
     }
   }
   if (input.low >= 0.0 && levels > 3) {
@@ -193,14 +196,34 @@ void add_functions(const InputView& input, std::vector<ModelTerm>& terms) {
 
 // A constant, one input, functions of it, several inputs, a constant that is searched, the row before.
 int complexity_of(const ModelTerm& term) {
-  static const std::map<std::string, int> of_family = {
-      {"offset", 1},       {"linear", 2},           {"gain", 2},          {"square", 3},
-      {"sign", 3},         {"absolute", 3},         {"cube", 4},          {"root", 4},
-      {"log", 4},          {"reciprocal", 4},       {"signed_square", 4}, {"gain_curvature", 4},
-      {"harmonic1", 5},    {"harmonic2", 5},        {"product", 6},       {"square_product", 7},
-      {"sign_product", 6}, {"load_friction", 5},    {"power", 9},         {"hill", 9},
-      {"sigmoid", 9},      {"coulomb_stribeck", 9}, {"rate", 10},         {"direction", 10},
-      {"previous", 11}};
+  static const std::map<std::string, int> of_family = {{"offset", 1},
+                                                       {"linear", 2},
+                                                       {"gain", 2},
+                                                       {"square", 3},
+                                                       {"sign", 3},
+                                                       {"absolute", 3},
+                                                       {"cube", 4},
+                                                       {"root", 4},
+                                                       {"log", 4},
+                                                       {"reciprocal", 4},
+                                                       {"signed_square", 4},
+                                                       {"signed_root", 4},
+                                                       {"gain_curvature", 4},
+                                                       {"harmonic1", 5},
+                                                       {"harmonic2", 5},
+                                                       {"product", 6},
+                                                       {"square_product", 7},
+                                                       {"sign_product", 6},
+                                                       {"load_friction", 5},
+                                                       {"power", 9},
+                                                       {"hill", 9},
+                                                       {"sigmoid", 9},
+                                                       {"coulomb_stribeck", 9},
+                                                       {"limit", 9},
+                                                       {"dead_band", 9},
+                                                       {"rate", 10},
+                                                       {"direction", 10},
+                                                       {"previous", 11}};
   constexpr int with_constant = 8;
   const auto found = of_family.find(term.family);
   return found != of_family.end() ? found->second : with_constant;
