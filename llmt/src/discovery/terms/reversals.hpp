@@ -26,4 +26,6 @@ struct Reversals {
 std::vector<Reversals> left_at_reversals(const Inputs& inputs, const MeasuredOutputs& measured, const Missing& missing,
                                          std::vector<bool>& apart);
 
+std::vector<std::string> notes_on_reversals(const std::vector<Reversals>& reversals);
+
 }  // namespace llmt::discovery

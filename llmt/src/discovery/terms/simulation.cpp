@@ -11,6 +11,7 @@
 #include "discovery/terms/averaged_rows.hpp"
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/determined.hpp"
+#include "discovery/terms/limits.hpp"
 #include "discovery/terms/motion.hpp"
 #include "discovery/terms/one_search.hpp"
 #include "discovery/terms/progress_of_searches.hpp"
@@ -108,22 +109,8 @@ std::vector<std::string> notes_on_rest(const Inputs& inputs) {
     if (!(inputs.zero_bands(j) > 0.0)) continue;
     notes.push_back(fmt::format(
         "{0} rests at {1} rows, with |{0}| < {2:.3g}. They were set apart, because dry friction at rest may be "
-        "anything "
-        "up to that of motion. The terms found take {0} for 0 there",
+        "anything up to that of motion. The terms found take {0} for 0 there",
         inputs.names[j], (inputs.values.col(j).array().abs() < inputs.zero_bands(j)).count(), inputs.zero_bands(j)));
-  }
-  return notes;
-}
-
-std::vector<std::string> notes_on_reversals(const std::vector<Reversals>& reversals) {
-  std::vector<std::string> notes;
-  for (const Reversals& own : reversals) {
-    notes.push_back(fmt::format(
-        "at reversals of {0}, where |{0}| < {1:.3g}, the root mean square of the deviations is {2:.2g} times that at "
-        "the "
-        "faster half of the rows, and no term explains this: a filter has rounded dry friction, or the machine sticks. "
-        "These {3} rows were set apart. The answer is about the other rows",
-        own.speed, own.limit, own.ratio, own.rows));
   }
   return notes;
 }
@@ -230,7 +217,8 @@ Beginning begin(const Simulation& simulation, const Inputs& inputs, const Measur
 Missing find(const Simulation& simulation, const Inputs& as_given, const MeasuredOutputs& measured,
              const std::vector<ModelTerm>& terms, MissingOptions options) {
   options.search.simplest_of_rivals = as_given.instants.size() > 0;
-  SmoothedInputs smooth = smoothed(as_given, simulation.predict(as_given.values, nominal_values(simulation)));
+  const Eigen::MatrixXd simulated = simulation.predict(as_given.values, nominal_values(simulation));
+  SmoothedInputs smooth = smoothed(as_given, simulated);
   const bool is_smoothed = smooth.change.size() > 0;
   Simulation there = simulation;
   if (is_smoothed) {
@@ -242,6 +230,7 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   const Inputs& inputs = smooth.inputs;
   SearchedRows rows{rows_at_rest(inputs)};
   for (std::size_t i = 0; i < rows.apart.size(); ++i) rows.apart[i] = rows.apart[i] || smooth.unknown_sign[i];
+  const std::vector<std::string> at_limits = notes_on_limits(rows_at_limits(measured, simulated, rows.apart));
   const auto search_without = [&](std::set<std::size_t> refuted) {
     Beginning beginning = begin(there, inputs, measured, terms, rows, options, refuted);
     // The filter of a recording looks like a state whose constants are not those of a machine.
@@ -269,6 +258,7 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   }
   const std::vector<std::string> at_rest = notes_on_rest(inputs);
   missing.notes.insert(missing.notes.begin(), at_rest.begin(), at_rest.end());
+  missing.notes.insert(missing.notes.begin(), at_limits.begin(), at_limits.end());
   missing.notes.insert(missing.notes.begin(), smooth.notes.begin(), smooth.notes.end());
   return missing;
 }
