@@ -71,23 +71,4 @@ Eigen::MatrixXd CommandSimulation::run(const Eigen::MatrixXd& rows, const Eigen:
   return result;
 }
 
-std::vector<Eigen::MatrixXd> CommandSimulation::derivatives(const Eigen::MatrixXd& rows,
-                                                            const Eigen::VectorXd& values) const {
-  // Tables are often written with six digits: smaller steps would be lost in their rounding.
-  constexpr double share_of_scale = 0.01;
-  std::vector<Eigen::MatrixXd> derivatives;
-  Eigen::VectorXd moved = values;
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    const auto place = static_cast<Eigen::Index>(k);
-    const double step = share_of_scale * parameters[k].scale;
-    moved(place) = values(place) + step;
-    const double upper = moved(place);
-    const Eigen::MatrixXd above = run(rows, moved);
-    moved(place) = values(place) - step;
-    derivatives.push_back((above - run(rows, moved)) / (upper - moved(place)));
-    moved(place) = values(place);
-  }
-  return derivatives;
-}
-
 }  // namespace llmt::apps

@@ -28,9 +28,6 @@ struct CommandSimulation {
   /// n x d. Throws std::runtime_error that names the command, the values, and what went wrong: an exit code, a signal,
   /// the time, the line of the output that cannot be read, the number of rows.
   Eigen::MatrixXd run(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values) const;
-
-  /// Central differences with a hundredth of each parameter's scale, two runs for each.
-  std::vector<Eigen::MatrixXd> derivatives(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values) const;
 };
 
 }  // namespace llmt::apps

@@ -121,9 +121,8 @@ report::TermsSummary discovered(const DiscoverArguments& arguments, const Compar
     if (!source.command.command.empty()) {
       const discovery::Simulation simulation{source.command.parameters,
                                              std::bind_front(&CommandSimulation::run, source.command)};
-      summary.missing =
-          discovery::find_missing_in_steps(simulation, std::bind_front(&CommandSimulation::derivatives, source.command),
-                                           comparison.inputs, comparison.measured, terms, options);
+      summary.missing = discovery::find_missing_in_steps(simulation, discovery::central_differences(simulation),
+                                                         comparison.inputs, comparison.measured, terms, options);
     } else {
       discovery::Simulation simulation =
           discovery::tabulated(comparison.simulated, arguments.outputs, adjusts("offset"), adjusts("scale"));

@@ -131,9 +131,14 @@ void set_simulation(Question& question, const nb::object& predict, const nb::lis
 }
 
 // `jacobian` is a callable or None. It gives n rows, the derivatives by all parameters of each output beside each
-// other: output 0 by parameter 0, 1, ..., then output 1.
-discovery::OutputDerivatives derivatives_of(const nb::object& jacobian, const Question& question) {
-  if (jacobian.is_none()) return {};
+// other: output 0 by parameter 0, 1, ..., then output 1. Without one, differences of a simulation that is a callable:
+// a call of Python takes longer than a search.
+discovery::OutputDerivatives derivatives_of(const nb::object& jacobian, const nb::object& predict,
+                                            const Question& question) {
+  if (jacobian.is_none()) {
+    if (predict.is_none() || question.simulation.parameters.empty()) return {};
+    return discovery::central_differences(question.simulation);
+  }
   const Eigen::Index d = std::ssize(question.outputs);
   const Eigen::Index p = std::ssize(question.simulation.parameters);
   return [function = Callable(std::make_shared<nb::callable>(nb::cast<nb::callable>(jacobian))), d, p](
@@ -247,7 +252,7 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
     return true;
   };
   question.terms = terms_of(question, own_terms, own_terms_only, true, question.untestable);
-  const discovery::OutputDerivatives derivatives = derivatives_of(jacobian, question);
+  const discovery::OutputDerivatives derivatives = derivatives_of(jacobian, predict, question);
   unlocked([&] {
     summary.missing =
         derivatives ? discovery::find_missing_in_steps(question.simulation, derivatives, question.inputs, outputs,

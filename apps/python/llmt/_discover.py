@@ -480,9 +480,9 @@ def discover(
         The outputs. The columns of an array are called y, or y0, y1, ...
     jacobian : callable
         ``jacobian(parameters, inputs)`` gives the derivatives of the outputs by the parameters: rows x outputs x
-        parameters, or rows x parameters of one output, or a dict with those by each parameter. The simulation is then
-        linearised at the parameters, and again at the new ones, until they settle (Gauss-Newton); it is called once a
-        step.
+        parameters, or rows x parameters of one output, or a dict with those by each parameter. Default: central
+        differences with a hundredth of each parameter's scale. The simulation is linearised at the parameters, and
+        again at the new ones, until they settle (Gauss-Newton).
     order : str
         Column that says in which order rows were measured; by default as they stand.
     time : n numbers

@@ -199,6 +199,44 @@ TEST(Parameters, MistakesAreNamed) {
   expect(message({mass}, {simulated * std::nan("")}), "a derivative by mass is not finite");
 }
 
+// Mass and damping as they are, or as their logarithms; counts its calls.
+Simulation counted(const Cart& cart, double mass, double damping, bool by_logarithm, int& calls) {
+  const auto own = [by_logarithm](double value) { return by_logarithm ? std::log(value) : value; };
+  const double scale = by_logarithm ? 0.1 : 0.2;
+  return {{{.name = "mass", .unit = "kg", .value = own(mass), .scale = scale},
+           {.name = "damping", .unit = "N s/m", .value = own(damping), .scale = scale}},
+          [&cart, &calls, by_logarithm](const Eigen::MatrixXd&, const Eigen::VectorXd& values) -> Eigen::MatrixXd {
+            ++calls;
+            return by_logarithm ? cart.force(std::exp(values(0)), std::exp(values(1)))
+                                : cart.force(values(0), values(1));
+          }};
+}
+
+TEST(Parameters, OfASimulationThatIsWorthFewCallsAreThoseOfTheFitOfAll) {
+  const Cart data = cart(3, 2.3, 1.4, 0.8, 0.02);
+  for (const bool by_logarithm : {false, true}) {
+    int calls = 0;
+    const Simulation simulation = counted(data, 2.0, 1.0, by_logarithm, calls);
+    const std::vector<ModelTerm> terms = standard_terms(data.inputs);
+    const Missing together = find_missing(simulation, data.inputs, data.measured, terms);
+    const int calls_together = calls;
+    calls = 0;
+    const Missing in_steps =
+        find_missing_in_steps(simulation, central_differences(simulation), data.inputs, data.measured, terms);
+    ASSERT_EQ(in_steps.found.size(), 1U);
+    EXPECT_EQ(in_steps.found[0].family, "signed_square");
+    EXPECT_EQ(together.found[0].family, "signed_square");
+    for (std::size_t k = 0; k < 2; ++k) {
+      EXPECT_NEAR(in_steps.parameters[k].value, together.parameters[k].value, 0.1 * together.standard_errors(k));
+    }
+    // At the start, two for each derivative, at the end, and with parameters alone: the first step was exact.
+    if (!by_logarithm) {
+      EXPECT_EQ(calls, 1 + 4 + 1 + 1);
+    }
+    EXPECT_LT(5 * calls, calls_together);
+  }
+}
+
 }  // namespace
 }  // namespace parameters_test
 }  // namespace llmt::discovery

@@ -71,10 +71,16 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
 using OutputDerivatives =
     std::function<std::vector<Eigen::MatrixXd>(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values)>;
 
+/// Central differences of the simulation's outputs, with a hundredth of each parameter's scale to both sides: two calls
+/// for each parameter. Larger steps than rounding asks for, because outputs may be written with six digits. Keeps the
+/// simulation.
+OutputDerivatives central_differences(Simulation simulation);
+
 /// find_missing() for a simulation that knows its derivatives, or that is worth few calls. It is linearised at the
 /// parameters, find_missing() searches and fits, and the simulation is linearised again at the new values
-/// (Gauss-Newton), until they move by less than a twentieth of their standard errors. A step that makes the sum of
-/// squares of what is left grow is halved. The errors before and after are those of the simulation itself.
+/// (Gauss-Newton), until they move by less than a twentieth of their standard errors, or the simulation turns out
+/// to be linear in them, as a rigid body is in its masses. A step that makes the sum of squares of what is left
+/// grow is halved. The errors before and after are those of the simulation itself.
 ///
 /// Throws as find_missing(), and for derivatives of another number or shape, or that are not finite.
 Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivatives& derivatives, const Inputs& inputs,
