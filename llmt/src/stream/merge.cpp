@@ -1,5 +1,6 @@
 // Streams that learned apart, as one: docs/algorithms/stream.md, "Streams that merge".
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -14,26 +15,45 @@ namespace llmt {
 struct StreamPiece {
   const StreamSetting& setting;  ///< of the other tree
   const Basis& basis;            ///< of the leaf
-  Eigen::MatrixXd gram;          ///< in this basis
+  Eigen::VectorXd change;        ///< of the leaf's model from the base of the basis
+  Eigen::MatrixXd gram;          ///< in the basis
   Eigen::Index rows;
   Eigen::VectorXd low;  ///< range of the inputs
   Eigen::VectorXd high;
 
-  /// How many of the rows, in parts of 1, are not above a threshold: all or none where their range tells. Otherwise
-  /// as if the input were uniform with its mean and variance.
-  double part_up_to(int input, double threshold) const {
-    if (high(input) <= threshold) return 1.0;
-    if (low(input) > threshold) return 0.0;
-    const double weight = gram(0, 0);
-    const double mean = gram(input + 1, 0) / weight;
-    const double variance = gram(input + 1, input + 1) / weight - mean * mean;
+  /// The rows on either side of a threshold, eq. (T.4); all on one side where their range says so.
+  std::array<StreamPiece, 2> split(int input, double threshold) const {
+    if (high(input) <= threshold) return {*this, share(0.0, 0.0 * gram)};
+    if (low(input) > threshold) return {share(0.0, 0.0 * gram), *this};
+    const double mean = gram(input + 1, 0) / gram(0, 0);
+    const double variance = gram(input + 1, input + 1) / gram(0, 0) - mean * mean;
     const double reach = std::sqrt(3.0 * std::max(variance, 0.0));
     const double at = setting.scaled(input, threshold) - basis.origin(input) - mean;
-    return reach > 0.0 ? std::clamp(0.5 + 0.5 * at / reach, 0.0, 1.0) : (at >= 0.0 ? 1.0 : 0.0);
+    const double below = reach > 0.0 ? std::clamp(0.5 + 0.5 * at / reach, 0.0, 1.0) : (at >= 0.0 ? 1.0 : 0.0);
+    const double above = 1.0 - below;
+    std::array<StreamPiece, 2> sides = {share(below, below * moved(input, below, mean, -reach * above)),
+                                        share(above, above * moved(input, above, mean, reach * below))};
+    sides[1].rows = rows - sides[0].rows;
+    sides[0].high(input) = sides[1].low(input) = threshold;
+    return sides;
   }
 
-  StreamPiece share(double part, Eigen::Index of_rows) const {
-    return {setting, basis, part * gram, of_rows, low, high};
+ private:
+  StreamPiece share(double part, Eigen::MatrixXd of_gram) const {
+    const auto count = static_cast<Eigen::Index>(std::llround(part * static_cast<double>(rows)));
+    return {setting, basis, change, std::move(of_gram), count, low, high};
+  }
+
+  /// The Gram matrix when the input's deviations from its mean are multiplied by `factor`, its mean moves by `shift`,
+  /// and the output follows the leaf's model.
+  Eigen::MatrixXd moved(int input, double factor, double mean, double shift) const {
+    const Eigen::Index residual = gram.rows() - 1;
+    Eigen::MatrixXd to = Eigen::MatrixXd::Identity(gram.rows(), gram.cols());
+    to(input + 1, input + 1) = factor;
+    to(input + 1, 0) = (1.0 - factor) * mean + shift;
+    to(residual, input + 1) = change(input + 1) * (factor - 1.0);
+    to(residual, 0) = change(input + 1) * to(input + 1, 0);
+    return to * gram * to.transpose();
   }
 };
 
@@ -77,7 +97,8 @@ void StreamTree::merge(const StreamTree& other, const StreamNode& branch, const 
   if (rows <= 0) return;
   const double part = static_cast<double>(rows) / static_cast<double>(branch.sums.rows);
   const Eigen::MatrixXd gram = part * matrix_of(setting_.shape, branch.sums.gram.data());
-  take(*root_, {other.setting_, branch.basis, gram, rows, branch.low, branch.high});
+  const Eigen::VectorXd change = branch.model - branch.basis.base;
+  take(*root_, {other.setting_, branch.basis, change, gram, rows, branch.low, branch.high});
 }
 
 void StreamTree::take(StreamNode& node, const StreamPiece& piece) {
@@ -90,17 +111,9 @@ void StreamTree::take(StreamNode& node, const StreamPiece& piece) {
     node.model = own_model(setting_, node, rank);
     return;
   }
-  const double part = piece.part_up_to(node.input, node.threshold);
-  const auto rows = static_cast<Eigen::Index>(std::llround(part * static_cast<double>(piece.rows)));
-  if (rows > 0) {
-    StreamPiece left = piece.share(part, rows);
-    left.high(node.input) = std::min(left.high(node.input), node.threshold);
-    take(*node.children[0], left);
-  }
-  if (rows < piece.rows) {
-    StreamPiece right = piece.share(1.0 - part, piece.rows - rows);
-    right.low(node.input) = std::max(right.low(node.input), node.threshold);
-    take(*node.children[1], right);
+  const std::array<StreamPiece, 2> sides = piece.split(node.input, node.threshold);
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (sides[side].rows > 0) take(*node.children[side], sides[side]);
   }
 }
 

@@ -46,8 +46,8 @@ TEST(StreamMerge, OneLeafIsLeastSquaresOfAllRows) {
   EXPECT_EQ(merged.counts().rows, 900);
 }
 
-// Every second row lies above 0.1, the others below -0.1: whatever threshold between them a stream has, its split is the
-// same.
+// Every second row lies above 0.1, the others below -0.1: whatever threshold between them a stream has, its split is
+// the same.
 TEST(StreamMerge, LeavesOnTheSameSideOfASplitAreAddedExactly) {
   Eigen::MatrixXd x = oracle::uniform(4000, 2, 1);
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
@@ -91,7 +91,9 @@ TEST(StreamMerge, TheSampleIsThatOfAllRows) {
   const Eigen::MatrixXd x = oracle::uniform(3000, 2, 1);
   const Eigen::MatrixXd y = affine(x) + noise(3000, 2);
   const llmt::StreamOptions options{.reservoir_rows = 300};
-  const auto sample_of = [](const Stream& stream) { return nlohmann::ordered_json::parse(to_json(stream))["reservoir"]; };
+  const auto sample_of = [](const Stream& stream) {
+    return nlohmann::ordered_json::parse(to_json(stream))["reservoir"];
+  };
   Stream whole = after(x, y, 0, 1500, options);
   whole.add(x.bottomRows(1450), y.bottomRows(1450));
   EXPECT_EQ(sample_of(merge(after(x, y, 0, 1500, options), after(x, y, 1500, 3000, options))), sample_of(whole));
