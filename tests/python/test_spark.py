@@ -1,5 +1,7 @@
 """Fits of Spark DataFrames, by Spark in this process."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -35,7 +37,7 @@ def test_spark_gives_the_bytes_of_one_process(session):
     state = distributed.start(["a", "b", "c"], "y", estimator=estimator, **OPTIONS)
     while distributed.status(state)["step"] != "finished":
         parts, block = [], 0
-        for begin, end in zip(starts[:-1], starts[1:], strict=True):
+        for begin, end in itertools.pairwise(starts):
             parts.append(distributed.sums(state, X[begin:end], y[begin:end], block))
             block += -(-(end - begin) // BLOCK)
         state = distributed.advance(state, distributed.merge(parts))
