@@ -174,7 +174,7 @@ def test_only_streams_of_the_same_columns_are_merged():
     stream = LocalLinearTreeRegressor().partial_fit(X, y)
     with pytest.raises(ValueError, match="merge needs two estimators that have learned by partial_fit"):
         stream.merge(LocalLinearTreeRegressor().fit(X, y))
-    with pytest.raises(ValueError, match=r"columns \['x1', .* do not go with"):
+    with pytest.raises(ValueError, match=r"columns \['x0', .* do not go with"):
         stream.merge(LocalLinearTreeRegressor().partial_fit(X[:, :1], y))
     with pytest.raises(ValueError, match="the streams have different options"):
         stream.merge(LocalLinearTreeRegressor(max_leaves=3).partial_fit(X, y))
