@@ -12,6 +12,7 @@ from llmt import LocalLinearTreeRegressor, distributed
 
 BLOCK = 65536
 BINS = 64
+BANDWIDTH = 1e9  # bytes a second between two machines
 
 
 def table(rows: int, inputs: int) -> tuple[np.ndarray, np.ndarray]:
@@ -108,12 +109,14 @@ def main() -> int:
         seconds = {
             step: passes[step] * np.dot(features(step, rows, inputs), formulas[step]) / workers for step in passes
         }
+        # Of every level of the tree of machines the first process receives one message of at most 32 MiB, then the rows.
+        received = np.ceil(np.log2(machines)) * grow * 2**25 + 8 * (inputs + 1) * rows
         of_branches = per_row_of_branch * rows * inputs**2 / cores
         print(
             f"{rows:.0e} x {inputs} on {machines} machines of {cores} cores, branches of {branch:.0e} rows: "
             + ", ".join(f"{passes[step]:.0f} {step} {seconds[step] / 3600:.2f} h" for step in passes)
             + f", {branches:.0f} branches one after the other {of_branches / 3600:.1f} h, "
-            f"rows through the first process {8 * (inputs + 1) * rows / 1e9:.0f} GB"
+            f"to the first process {received / 1e9:.0f} GB: {received / BANDWIDTH / 3600:.2f} h"
         )
     return 0
 

@@ -1,10 +1,11 @@
 """python3 bench/distributed/large.py LLMT ROWS FOLDER [--memory 4G] [--inputs D] [OPTIONS of llmt fit]: time, peak
 of resident memory and error of `llmt fit` of an Arrow file, which is written into FOLDER in pieces and deleted
-afterwards (docs/algorithms/distributed.md, "What it costs"). Needs 8 (D + 1) ROWS bytes of disk. `--lightgbm` fits
-LightGBM to the same rows instead, read into memory as 32-bit numbers."""
+afterwards (docs/algorithms/distributed.md, "What it costs"). Needs 8 (D + 1) ROWS bytes of disk. `--rival NAME` fits
+another learner instead, to whose process no more than --memory is given."""
 
 import argparse
 import os
+import resource
 import subprocess
 import sys
 import time
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+from large_rivals import RIVALS, limit_memory
 
 PIECE = 1 << 20
 
@@ -75,30 +77,24 @@ def fit_llmt(given: argparse.Namespace, table: Path, asked: np.ndarray) -> np.nd
     return values
 
 
-def fit_lightgbm(given: argparse.Namespace, table: Path, asked: np.ndarray) -> np.ndarray:
-    import resource
-
-    import lightgbm
-
+def fit_rival(given: argparse.Namespace, table: Path, asked: np.ndarray) -> np.ndarray:
+    limit_memory(bytes_of(given.memory))
     begin = time.monotonic()
-    x = np.empty((given.rows, given.inputs), np.float32)
-    y = np.empty(given.rows, np.float32)
-    with pa.memory_map(str(table)) as source, pa.ipc.open_file(source) as reader:
-        at = 0
-        for number in range(reader.num_record_batches):
-            piece = reader.get_batch(number)
-            for column in range(given.inputs):
-                x[at : at + len(piece), column] = piece.column(column)
-            y[at : at + len(piece)] = piece.column(given.inputs)
-            at += len(piece)
-    model = lightgbm.LGBMRegressor(n_jobs=given.threads, verbose=-1).fit(x, y)
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    print(
-        f"LightGBM: {time.monotonic() - begin:.0f} s, {used.ru_utime + used.ru_stime:.0f} CPU s, "
-        f"{used.ru_maxrss / 2**20:.2f} GiB resident at most, pages of the mapped file included",
-        flush=True,
-    )
-    return model.predict(asked)
+    try:
+        return RIVALS[given.rival](table, given.rows, asked, given.rounds, given.threads)
+    except Exception as error:  # every learner has its own type for what it could not allocate
+        sys.exit(f"{given.rival} ended with {type(error).__name__}: {str(error).strip() or 'no message'}")
+    finally:
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        print(
+            f"{given.rival}: {time.monotonic() - begin:.0f} s, {used.ru_utime + used.ru_stime:.0f} CPU s, "
+            f"{used.ru_maxrss / 2**20:.2f} GiB resident at most, pages of the mapped file included",
+            flush=True,
+        )
+
+
+def bytes_of(text: str) -> int:
+    return int(float(text[:-1]) * 2 ** {"M": 20, "G": 30}[text[-1]])
 
 
 def main() -> int:
@@ -109,21 +105,21 @@ def main() -> int:
     parser.add_argument("--memory", default="4G")
     parser.add_argument("--inputs", type=int, default=10)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--lightgbm", action="store_true")
+    parser.add_argument("--rival", choices=RIVALS)
+    parser.add_argument("--rounds", type=int, default=100, help="trees of the rival")
+    parser.add_argument("--keep", action="store_true", help="keep the table in FOLDER, and take one that is there")
     given, options = parser.parse_known_args()
     given.options = [*options, "--threads", str(given.threads)]
     table = given.folder / "large.arrow"
     try:
-        begin = time.monotonic()
-        write_table(table, given.rows, given.inputs)
-        print(
-            f"{given.rows} rows, {table.stat().st_size / 1e9:.2f} GB written in {time.monotonic() - begin:.0f} s",
-            flush=True,
-        )
+        if not (given.keep and table.exists()):
+            write_table(table, given.rows, given.inputs)
+        print(f"{given.rows} rows, {table.stat().st_size / 1e9:.2f} GB", flush=True)
         asked, truth = friedman(np.random.default_rng(2), 50000, given.inputs)
-        predicted = (fit_lightgbm if given.lightgbm else fit_llmt)(given, table, asked)
+        predicted = (fit_rival if given.rival else fit_llmt)(given, table, asked)
     finally:
-        table.unlink(missing_ok=True)
+        if not given.keep:
+            table.unlink(missing_ok=True)
     print(f"RMSE to the function {np.sqrt(np.mean((predicted - truth) ** 2)):.4f}")
     return 0
 

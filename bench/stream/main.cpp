@@ -4,5 +4,5 @@
 
 int main(int argc, char** argv) {
   return bench::run_program("stream", "What streams learn and cost", argc, argv, bench::add_alarms, bench::add_drift,
-                            bench::add_scaling, bench::add_sets, bench::add_spread);
+                            bench::add_merged, bench::add_scaling, bench::add_sets, bench::add_spread);
 }

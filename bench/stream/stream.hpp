@@ -18,6 +18,7 @@ double feed(llmt::Stream& stream, Eigen::Index rows, std::uint64_t seed);
 
 void add_alarms(CLI::App& program);
 void add_drift(CLI::App& program);
+void add_merged(CLI::App& program);
 void add_scaling(CLI::App& program);
 void add_sets(CLI::App& program);
 void add_spread(CLI::App& program);

@@ -156,6 +156,30 @@ def test_partial_fit_goes_on_where_it_stopped():
     assert np.sqrt(np.mean((whole.predict(X) - y) ** 2)) < 0.5 * y.std()
 
 
+def test_shards_learned_apart_are_merged():
+    X, y = stepped(6000)
+    first = LocalLinearTreeRegressor().partial_fit(X[:3000], y[:3000])
+    second = pickle.loads(pickle.dumps(LocalLinearTreeRegressor().partial_fit(X[3000:], y[3000:])))
+    before = second.to_json()
+    assert first.merge(second) is first
+    assert first.summary_["rows"] == 6000
+    assert second.to_json() == before
+    assert np.sqrt(np.mean((first.predict(X) - y) ** 2)) < 0.5 * y.std()
+    goes_on = pickle.loads(pickle.dumps(first))
+    assert first.partial_fit(X[:100], y[:100]).to_json() == goes_on.partial_fit(X[:100], y[:100]).to_json()
+
+
+def test_only_streams_of_the_same_columns_are_merged():
+    X, y = stepped(400)
+    stream = LocalLinearTreeRegressor().partial_fit(X, y)
+    with pytest.raises(ValueError, match="merge needs two estimators that have learned by partial_fit"):
+        stream.merge(LocalLinearTreeRegressor().fit(X, y))
+    with pytest.raises(ValueError, match=r"columns \['x0', .* do not go with"):
+        stream.merge(LocalLinearTreeRegressor().partial_fit(X[:, :1], y))
+    with pytest.raises(ValueError, match="the streams have different options"):
+        stream.merge(LocalLinearTreeRegressor(max_leaves=3).partial_fit(X, y))
+
+
 def test_fits_in_threads_give_the_same_bytes():
     X, y = stepped(400)
     expected = LocalLinearTreeRegressor(n_jobs=1).fit(X, y).to_json()

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-OPTIONAL = {"dask", "distributed", "joblib", "matplotlib", "onnx", "onnxruntime", "pandas", "polars", "pyarrow", "scipy", "shap", "sklearn", "sympy"}
+OPTIONAL = {"dask", "distributed", "joblib", "matplotlib", "onnx", "onnxruntime", "pandas", "polars", "pyarrow", "pyspark", "scipy", "shap", "sklearn", "sympy"}
 
 
 def imported_by(statement):

@@ -184,6 +184,11 @@ void add_stream(nb::module_& module) {
             self.add(x, y, w);
           },
           nb::arg("inputs"), nb::arg("outputs"), nb::arg("weights") = nb::none())
+      .def("merge",
+           [](Stream& self, const Stream& other) {
+             const auto copy_of = [](const Stream& stream) { return stream_from_json(to_json(stream)); };
+             self = merge(copy_of(self), copy_of(other));
+           })
       .def("rows", [](const Stream& self) { return self.counts().rows; })
       .def("prequential_rmse",
            [](const Stream& self) {

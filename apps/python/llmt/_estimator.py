@@ -203,12 +203,33 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         if outputs.shape[1] != self.n_outputs_:
             raise ValueError(f"y has {outputs.shape[1]} targets, the rows before had {self.n_outputs_}")
         stream.handle.add(table.values, outputs, weights_of(sample_weight, len(outputs)))
+        self._sample = spread(table.values, 500)
+        self._take_stream(stream)
+        return self
+
+    def merge(self, other: "LocalLinearTreeRegressor") -> "LocalLinearTreeRegressor":
+        """Adds what another estimator learned by `partial_fit` from other rows, which this one need not see.
+
+        Both must have learned from the same columns with the same parameters. Shards of a table are so learned apart,
+        by any number of processes, and merged in pairs.
+        """
+        own: StreamModel | None = getattr(self, "_stream", None)
+        given: StreamModel | None = getattr(other, "_stream", None)
+        if own is None or given is None:
+            raise ValueError("merge needs two estimators that have learned by partial_fit")
+        if self._inputs != other._inputs or self._outputs != other._outputs:
+            raise ValueError(
+                f"columns {self._inputs} and targets {self._outputs} do not go with {other._inputs} and {other._outputs}"
+            )
+        own.handle.merge(given.handle)
+        self._take_stream(own)
+        return self
+
+    def _take_stream(self, stream: StreamModel) -> None:
         self.model_ = Model(stream.handle.model(self._inputs, self._outputs))
         self.summary_ = {"rows": stream.handle.rows(), "rmse": stream.handle.prequential_rmse()}
-        self._sample = spread(table.values, 500)
         self._fit = self._mean = None
         self._is_readable = False
-        return self
 
     def predict_standard_error(self, X: Any) -> np.ndarray:
         """Standard errors of the local models' means, shaped as predictions; for intervals: predict_interval."""

@@ -67,11 +67,18 @@ class Stream {
   Model snapshot(ValidityChoice validity = ValidityChoice::automatic) const;
 
  private:
+  friend Stream merge(Stream first, Stream second);
   friend std::string to_json(const Stream& stream);
   friend Stream stream_from_json(const std::string& text, const std::string& name);
 
   std::unique_ptr<StreamState> state_;
 };
+
+/// What two streams learned from different rows, as one stream: shards may be learned apart, on any machine. The
+/// splits are those of the stream with more rows (of `first` if they have equally many). To each of its leaves the
+/// sums of the other's leaves are added: exactly where these lie in it, shared out where a split crosses them
+/// (docs/algorithms/stream.md). Throws std::invalid_argument if inputs, outputs or options differ.
+Stream merge(Stream first, Stream second);
 
 /// Everything that a stream needs to go on, as JSON text (docs/file-formats.md): trees with their sums, rows that are
 /// kept, what is known of changes under way. All digits of numbers are kept. It takes about 20 bytes for each number of

@@ -28,6 +28,8 @@ struct StreamOptions {
   /// Rows that are kept. One in eight is held out: these choose crisp or blended leaves and the leaf count of a
   /// snapshot. The others estimate blends. 0: a snapshot is the crisp tree as it stands.
   Eigen::Index reservoir_rows = 20000;
+
+  bool operator==(const StreamOptions&) const = default;
 };
 
 /// Counts of the rows, leaves and changes of a stream so far.

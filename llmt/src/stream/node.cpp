@@ -29,13 +29,15 @@ Eigen::Index bytes_of(const StreamNode& node) {
   return bytes;
 }
 
-double predict(const StreamNode& top, const StreamRow& row) {
+const StreamNode& leaf_of(const StreamNode& top, const double* x) {
   const StreamNode* node = &top;
   while (!node->is_leaf()) {
-    node = node->children[side_of(*node, row.x[node->input])].get();
+    node = node->children[side_of(*node, x[node->input])].get();
   }
-  return value_of(*node, row.z);
+  return *node;
 }
+
+double predict(const StreamNode& top, const StreamRow& row) { return value_of(leaf_of(top, row.x), row.z); }
 
 Sums all_sums(const StreamSetting& setting, const StreamNode& node) {
   Sums sums = node.sums;

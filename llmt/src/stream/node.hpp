@@ -48,6 +48,9 @@ inline std::size_t side_of(const StreamNode& node, double x) {
 /// The prediction of a node's own model.
 double value_of(const StreamNode& node, const double* z);
 
+/// The leaf below a node that a row of inputs belongs to.
+const StreamNode& leaf_of(const StreamNode& top, const double* x);
+
 /// The prediction of the tree below a node.
 double predict(const StreamNode& top, const StreamRow& row);
 

@@ -28,6 +28,9 @@ class Reservoir {
   /// Offers a row that comes `times` times. Returns true if it is in the sample now and held out.
   bool add(const double* values, Eigen::Index times = 1);
 
+  /// Offers the rows of another reservoir of this capacity: the sample of the rows that both have been offered.
+  void merge(const Reservoir& other);
+
   /// Number of different rows divided by number of rows, over the rows in the sample and all times that they have come.
   /// 1 if none has come twice.
   double different_fraction() const {

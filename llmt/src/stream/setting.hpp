@@ -43,6 +43,11 @@ struct StreamSetting {
   double unscaled(Eigen::Index input, double z) const { return centre(input) + scale(input) * z; }
 };
 
+/// Inputs in scaled units.
+inline void set_scaled(const StreamSetting& setting, const double* x, Eigen::VectorXd& z) {
+  for (Eigen::Index j = 0; j < setting.inputs; ++j) z(j) = setting.scaled(j, x[j]);
+}
+
 /// What is known of a column of the stream.
 struct ColumnRange {
   double low = 0.0;

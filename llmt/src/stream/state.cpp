@@ -21,12 +21,6 @@ constexpr double recent_rows = 1000.0;
 constexpr double rounding_of_deviation = 1e-10;
 constexpr double rounding_of_magnitude = 1e-13;
 
-void set_scaled(const StreamSetting& setting, const double* x, Eigen::VectorXd& z) {
-  for (Eigen::Index j = 0; j < setting.inputs; ++j) {
-    z(j) = setting.scaled(j, x[j]);
-  }
-}
-
 }  // namespace
 
 StreamState::StreamState(Eigen::Index inputs, Eigen::Index outputs, const StreamOptions& options)

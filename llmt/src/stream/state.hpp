@@ -31,6 +31,10 @@ class StreamState {
   /// Learns a row: inputs, outputs and weight one after the other.
   void add(const std::vector<double>& row);
 
+  /// Adds what another stream with the same options, and with no more rows, has learned.
+  void merge(const StreamState& other);
+  bool has_options_of(const StreamState& other) const { return options_ == other.options_; }
+
   Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
 
   Eigen::VectorXd prequential_rmse() const;
@@ -51,6 +55,8 @@ class StreamState {
   StreamTree& add_tree(const StreamSetting& setting, const Eigen::VectorXd& first_model);
 
   void describe_columns(const std::vector<double>& row);
+  std::vector<LeafRows> learn_sample(const StreamState& other);
+  void merge_columns(const StreamState& other);
   void learn(const double* row);
   void start();
   void start_tree(const RowMajor& first, Eigen::Index output, const Eigen::VectorXd& centre,

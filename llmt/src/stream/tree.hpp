@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <functional>
+#include <map>
 #include <memory>
 
 #include "stream/node.hpp"
@@ -13,6 +14,11 @@
 #include "stream/sums.hpp"
 
 namespace llmt {
+
+struct StreamPiece;
+
+/// Numbers of rows of leaves.
+using LeafRows = std::map<const StreamNode*, Eigen::Index>;
 
 /// The incremental tree of docs/algorithms/stream.md.
 class StreamTree {
@@ -31,6 +37,10 @@ class StreamTree {
   /// Learns a row. Returns the error of the prediction before.
   double learn(const StreamRow& row);
   double predict(const StreamRow& row) const;
+
+  /// Adds the rows that another tree learned, but for those of its leaves that this tree has learned since. Splits stay
+  /// as they are.
+  void merge(const StreamTree& other, const LeafRows& learned);
 
   const StreamSetting& setting() const { return setting_; }
   const StreamNode& root() const { return *root_; }
@@ -55,6 +65,8 @@ class StreamTree {
   void settle(std::unique_ptr<StreamNode>& slot);
   void restart(StreamNode& node) const;
   void recount();
+  void merge(const StreamTree& other, const StreamNode& branch, const LeafRows& learned);
+  void take(StreamNode& node, const StreamPiece& piece);
   std::unique_ptr<StreamNode> make_node(Basis basis) const;
 
   StreamSetting setting_;
