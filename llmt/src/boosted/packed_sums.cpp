@@ -3,7 +3,28 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/simd.hpp"
+
 namespace llmt {
+namespace {
+
+LLMT_FOR_EACH_INSTRUCTION_SET
+void pack_within_32_bits(const double* residuals, const double* weights, std::size_t count, PackedUnits units,
+                         PackedSum* __restrict terms) {
+  for (std::size_t k = 0; k < count; ++k) terms[k] = packed<std::int32_t>(residuals[k], weights[k], units);
+}
+
+}  // namespace
+
+void pack_rows(std::span<const double> residuals, std::span<const double> weights, const PackedUnits& units,
+               std::span<PackedSum> terms) {
+  constexpr double most_of_32_bits = 0x1p30;
+  if (units.most < most_of_32_bits) {
+    pack_within_32_bits(residuals.data(), weights.data(), terms.size(), units, terms.data());
+    return;
+  }
+  for (std::size_t k = 0; k < terms.size(); ++k) terms[k] = packed(residuals[k], weights[k], units);
+}
 
 PackedUnits units_of(std::span<const double> residuals, std::span<const double> weights, bool equal_weights) {
   // Half of the bits that are there: rounding adds at most one half a row.

@@ -1,6 +1,8 @@
 #include "boosted/split_gain.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cstring>
 
 #include "base/simd.hpp"
 
@@ -12,7 +14,7 @@ namespace {
 struct RunningSums {
   int count = 0;
   std::array<int, most_bins + 1> bin;
-  std::array<int, most_bins> count_up_to;  // each bin of the feature
+  std::array<std::uint8_t, most_bins> count_up_to;  // each bin of the feature
   std::array<double, most_bins + 1> weight;
   std::array<double, most_bins + 1> residual;
   std::array<double, most_bins + 1> z;
@@ -20,6 +22,27 @@ struct RunningSums {
   std::array<double, most_bins + 1> ze;
   SideSums all = {};
 };
+
+// 1 for each bin that holds rows, else 0.
+LLMT_FOR_EACH_INSTRUCTION_SET
+void flag_bins(const PackedSum* histogram, std::uint8_t* __restrict flags) {
+  for (int b = 0; b < most_bins; ++b) flags[b] = histogram[b] != 0 ? 1 : 0;
+}
+
+// Eight bins at a time, as the bytes of a word.
+void find_bins(RunningSums& sums, const Histogram& histogram) {
+  static_assert(std::endian::native == std::endian::little && most_bins % 8 == 0);
+  constexpr std::uint64_t ones = 0x0101010101010101;
+  std::array<std::uint8_t, most_bins> flags;
+  flag_bins(histogram.data(), flags.data());
+  for (int b = 0; b < most_bins; b += 8) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, &flags[b], sizeof word);
+    const std::uint64_t up_to = word * ones + static_cast<std::uint64_t>(sums.count) * ones;  // no byte overflows
+    std::memcpy(&sums.count_up_to[b], &up_to, sizeof up_to);
+    for (; word != 0; word &= word - 1) sums.bin[sums.count++] = b + std::countr_zero(word) / 8;
+  }
+}
 
 void run(RunningSums& sums, const BinnedFeature& feature, const Histogram& histogram, const PackedUnits& units,
          bool missing_left) {
@@ -35,13 +58,8 @@ void run(RunningSums& sums, const BinnedFeature& feature, const Histogram& histo
     sums.z[0] = sums.zz[0] = sums.ze[0] = 0.0;
     sums.count = 1;
   }
-  const int bins = feature.num_bins();
   const int first = sums.count;
-  for (int b = 0; b < bins; ++b) {
-    sums.bin[sums.count] = b;
-    sums.count += histogram[b] != 0 ? 1 : 0;
-    sums.count_up_to[b] = sums.count;
-  }
+  find_bins(sums, histogram);
   for (int k = first; k < sums.count; ++k) {
     const PackedSum sum = histogram[sums.bin[k]];
     const double weight = static_cast<double>(weight_of(sum)) * units.weight;
