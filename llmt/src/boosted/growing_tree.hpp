@@ -138,7 +138,7 @@ class TreeGrower {
   bool is_searching_ = true;
   std::vector<float> values_;  // of the feature that is split, in that order
   std::vector<int> cells_;     // of that feature, before rows are divided; missing values at the end of their side
-  bool is_gathered_ = false;  // whether cells_ and values_ have the next split's
+  bool is_gathered_ = false;   // whether cells_ and values_ have the next split's
   std::vector<int> spare_order_;
   std::vector<float> spare_values_;
   std::vector<double> spare_residuals_;
