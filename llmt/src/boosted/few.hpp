@@ -14,7 +14,7 @@ namespace llmt {
 template <class T>
 class Few {
  public:
-  int size() const { return size_; }
+  std::size_t size() const { return size_; }
   void push_back(const T& value) { values_[size_++] = value; }
   T& operator[](std::ptrdiff_t k) { return values_[k]; }
   const T& operator[](std::ptrdiff_t k) const { return values_[k]; }
@@ -24,7 +24,7 @@ class Few {
 
  private:
   std::array<T, most_boosted_slopes> values_ = {};
-  int size_ = 0;
+  std::size_t size_ = 0;
 };
 
 }  // namespace llmt

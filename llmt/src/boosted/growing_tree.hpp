@@ -33,7 +33,7 @@ struct PathModel {
 
   double at(const BinnedRows& rows, Eigen::Index row) const {
     double value = constant;
-    for (int k = 0; k < features.size(); ++k) value += slopes[k] * rows.features[features[k]].values[row];
+    for (std::size_t k = 0; k < features.size(); ++k) value += slopes[k] * rows.features[features[k]].values[row];
     return value;
   }
 };
