@@ -29,18 +29,26 @@ void flag_bins(const PackedSum* histogram, std::uint8_t* __restrict flags) {
   for (int b = 0; b < most_bins; ++b) flags[b] = histogram[b] != 0 ? 1 : 0;
 }
 
-// Eight bins at a time, as the bytes of a word.
+// Lists the bins that hold rows. Flags are taken as the bytes of words: times `ones`, a byte has the sum of those up to
+// it; times `bits`, the highest byte has one bit for each.
 void find_bins(RunningSums& sums, const Histogram& histogram) {
-  static_assert(std::endian::native == std::endian::little && most_bins % 8 == 0);
+  static_assert(std::endian::native == std::endian::little && most_bins % 64 == 0);
   constexpr std::uint64_t ones = 0x0101010101010101;
+  constexpr std::uint64_t bits = 0x0102040810204080;
   std::array<std::uint8_t, most_bins> flags;
   flag_bins(histogram.data(), flags.data());
-  for (int b = 0; b < most_bins; b += 8) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, &flags[b], sizeof word);
-    const std::uint64_t up_to = word * ones + static_cast<std::uint64_t>(sums.count) * ones;  // no byte overflows
-    std::memcpy(&sums.count_up_to[b], &up_to, sizeof up_to);
-    for (; word != 0; word &= word - 1) sums.bin[sums.count++] = b + std::countr_zero(word) / 8;
+  auto count = static_cast<std::uint64_t>(sums.count);
+  for (int first = 0; first < most_bins; first += 64) {
+    std::uint64_t set = 0;
+    for (int b = 0; b < 64; b += 8) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, &flags[first + b], sizeof word);
+      const std::uint64_t up_to = (word + count) * ones;  // the first byte has those before the word too
+      std::memcpy(&sums.count_up_to[first + b], &up_to, sizeof up_to);
+      count = up_to >> 56;
+      set |= (word * bits >> 56) << b;
+    }
+    for (; set != 0; set &= set - 1) sums.bin[sums.count++] = first + std::countr_zero(set);
   }
 }
 
