@@ -14,9 +14,11 @@
 #include "llmt/learning.hpp"
 #include "llmt/readable.hpp"
 #include "llmt/stream_command.hpp"
+#include "llmt/teach.hpp"
 #include "report/fit/fit_summary.hpp"
 #include "report/fit/of_fit.hpp"
 #include "report/fit/readable_summary.hpp"
+#include "report/fit/teaching_summary.hpp"
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
 #include "shared/options.hpp"
@@ -33,6 +35,7 @@ struct FitArguments {
   bool no_intervals = false;
   bool stream = false;
   bool boost = false;
+  bool teach = false;
   ArrowFitArguments arrow;
   std::string readable;  ///< the loss in per cent; empty: none is asked for
   ReportFiles reports;
@@ -48,15 +51,18 @@ bool keeps_intervals(const FitArguments& arguments) { return !arguments.no_inter
 struct Fitting {
   PreparedFit prepared;
   FitResult result;
+  std::optional<TaughtResult> taught = {};
 };
 
-Fitting fit_with_bar(const LearningTable& table) {
+Fitting fit_with_bar(const FitArguments& arguments, const LearningTable& table) {
   ProgressBar bar("fitting");
   Work work(bar.callback());
   Work preparing(work, table.options.loss == Loss::tukey ? 0.2 : 0.05);
   const PreparedFit prepared(table.data, table.options, preparing.progress());
   Work fitting(work, work.left());
-  return {prepared, fit(prepared, fitting.progress())};
+  if (!arguments.teach) return {prepared, fit(prepared, fitting.progress())};
+  TaughtResult taught = fit_taught(prepared, {.seed = table.options.folds.seed}, fitting.progress());
+  return {taught.prepared, taught.fit, taught};
 }
 
 // The readable tree beside the model, written if the model is.
@@ -115,13 +121,16 @@ void fit_command(FitArguments arguments) {
     loss = read_number("--readable", arguments.readable, per_cent) / 100.0;
   }
   LearningTable table = read_learning_table(arguments.learning);
+  if (const std::string why = why_not_taught(table.options); arguments.teach && !why.empty()) {
+    throw std::invalid_argument("llmt::fit_taught: --teach does not go with " + why);
+  }
   if (const std::string why = why_not_readable(table.options); !arguments.readable.empty() && !why.empty()) {
     throw std::invalid_argument("llmt::fit_readable: --readable does not go with " + why);
   }
   // Folds' models say which rows no model predicts; the report needs them too, and the file unless it is to be small.
   const bool looks_for_gross_errors = table.options.loss == Loss::squared;
   table.options.intervals = keeps_intervals(arguments) || arguments.reports.wanted() || looks_for_gross_errors;
-  Fitting fitting = fit_with_bar(table);
+  Fitting fitting = fit_with_bar(arguments, table);
   FitResult& result = fitting.result;
   warn_of_gross_errors(arguments.learning, table, result);
   if (!arguments.output.empty()) {
@@ -133,12 +142,14 @@ void fit_command(FitArguments arguments) {
   report::FitRun run{arguments.learning.data, table.options, *table.data, table.lines, arguments.output};
   if (arguments.json) {
     Json summary = report::fit_json(run, result);
+    if (fitting.taught) summary["teaching"] = report::teaching_json(*fitting.taught);
     if (readable) summary["readable"] = report::readable_json(*readable);
     print_json(summary);
     return;
   }
   run.data = table_name(run.data);
   print(report::fit_text(run, result, output_width()));
+  if (fitting.taught) print(report::teaching_text(*fitting.taught, output_width()));
   if (readable) print(report::readable_text(result, *readable, loss, output_width()));
   if (readable && !arguments.output.empty()) {
     print(fmt::format("Readable tree written to {}; llmt inspect --rules prints it\n",
@@ -166,6 +177,9 @@ void add_fit(CLI::App& app) {
                  "Also the smallest crisp tree with short, rounded equations whose held-out error is at most this many "
                  "per cent above that of the best crisp tree [15]; written beside the model as NAME.readable.json")
       ->option_text("[=LOSS]");
+  command->add_flag("--teach", arguments->teach,
+                    "Fit the tree to the answers of a sum of trees (--boost), on the rows and on rows made of them; "
+                    "taken if its held-out error is smaller. Takes several times as long");
   add_report_options(*command, arguments->reports, "predicted against observed");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory");

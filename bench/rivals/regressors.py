@@ -92,6 +92,7 @@ class M5P(Program):
 REGRESSORS = {
     "llmt": (None, Llmt),
     "llmt (boost)": (None, lambda seed: Llmt(seed, "--boost")),
+    "llmt (teach)": (None, lambda seed: Llmt(seed, "--teach")),
     "llmt (crisp)": (None, lambda seed: Llmt(seed, "--validity", "crisp")),
     "ChimeraBoost": ("chimeraboost", lambda seed: ChimeraBoostRegressor(thread_count=1, random_state=seed)),
     "CatBoost": ("catboost", lambda seed: CatBoostRegressor(
@@ -117,4 +118,4 @@ REGRESSORS = {
     "M5P": (None, lambda seed: M5P()),
 }
 # Fits or predictions that can take minutes, and the program that pip does not install.
-ONLY_WHEN_NAMED = ["EBM", "APLR", "Cubist (20 committees, 5 neighbours)", "pyoperon", "M5P"]
+ONLY_WHEN_NAMED = ["llmt (teach)", "EBM", "APLR", "Cubist (20 committees, 5 neighbours)", "pyoperon", "M5P"]

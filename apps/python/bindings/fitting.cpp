@@ -15,6 +15,7 @@
 #include "llmt/outliers.hpp"
 #include "llmt/readable.hpp"
 #include "llmt/stream.hpp"
+#include "llmt/teach.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/interruptible.hpp"
 #include "python/bindings/module.hpp"
@@ -26,6 +27,7 @@
 #include "report/fit/gross_errors.hpp"
 #include "report/fit/of_fit.hpp"
 #include "report/fit/readable_summary.hpp"
+#include "report/fit/teaching_summary.hpp"
 #include "report/table/named_inputs.hpp"
 
 namespace llmt::python {
@@ -37,8 +39,12 @@ constexpr double readable_share = 0.4;
 // A fit with all that reports need of it.
 class Fit {
  public:
-  Fit(TrainingData data, const FitOptions& options, std::optional<double> readable_loss, const nb::object& report)
+  Fit(TrainingData data, const FitOptions& options, std::optional<double> readable_loss, bool teach,
+      const nb::object& report)
       : options_(options), loss_(readable_loss.value_or(0.15)) {
+    if (const std::string why = teach ? why_not_taught(options) : ""; !why.empty()) {
+      throw std::invalid_argument("teaching does not go with " + why);
+    }
     if (const std::string why = readable_loss ? why_not_readable(options) : ""; !why.empty()) {
       throw std::invalid_argument("a readable tree does not go with " + why);
     }
@@ -51,7 +57,13 @@ class Fit {
           Work preparing(work, preparing_share);
           prepared_.emplace(shared, options_, preparing.progress());
           Work fitting(work, work.left() - (readable_loss ? readable_share : 0.0));
-          result_.emplace(fit(*prepared_, fitting.progress()));
+          if (teach) {
+            taught_ = fit_taught(*prepared_, {.seed = options_.folds.seed}, fitting.progress());
+            prepared_ = taught_->prepared;
+            result_ = taught_->fit;
+          } else {
+            result_.emplace(fit(*prepared_, fitting.progress()));
+          }
           if (!readable_loss) return;
           Work reading(work, work.left());
           readable_ = fit_readable(*prepared_, result_->summary, loss_, reading.progress());
@@ -66,12 +78,14 @@ class Fit {
 
   std::string summary(const std::string& data) const {
     report::Json summary = report::fit_json(run(data), *result_);
+    if (taught_) summary["teaching"] = report::teaching_json(*taught_);
     if (readable_) summary["readable"] = report::readable_json(*readable_);
     return summary.dump();
   }
 
   std::string text(const std::string& data, std::size_t width) const {
     std::string text = report::fit_text(run(data), *result_, width);
+    if (taught_) text += report::teaching_text(*taught_, width);
     if (readable_) text += report::readable_text(*result_, *readable_, loss_, width);
     return text;
   }
@@ -125,6 +139,7 @@ class Fit {
   double loss_;
   std::optional<PreparedFit> prepared_;
   std::optional<FitResult> result_;
+  std::optional<TaughtResult> taught_;
   std::optional<ReadableResult> readable_;
   std::vector<Eigen::Index> lines_;  // of the rows, counted from 0
 };
@@ -133,14 +148,15 @@ std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const 
                                std::vector<std::string> input_names, std::vector<std::string> output_names,
                                std::vector<std::vector<std::string>> levels, const std::optional<Vector>& weights,
                                const std::optional<Vector>& groups, std::vector<Eigen::Index> held_out,
-                               bool may_have_codes, std::optional<double> readable_loss, const nb::object& report) {
+                               bool may_have_codes, std::optional<double> readable_loss, bool teach,
+                               const nb::object& report) {
   TrainingData data = training_data_of(inputs, outputs, weights, groups);
   data.held_out = std::move(held_out);
   data.levels = std::move(levels);
   data.may_have_codes = may_have_codes;
   data.input_names = std::move(input_names);
   data.output_names = std::move(output_names);
-  return std::make_unique<Fit>(std::move(data), options_of(options), readable_loss, report);
+  return std::make_unique<Fit>(std::move(data), options_of(options), readable_loss, teach, report);
 }
 
 // Inputs that look as if nobody meant them: (kind, position, unit).
@@ -218,7 +234,8 @@ void add_fitting(nb::module_& module) {
   module.def("fit", &fit_table, nb::arg("inputs"), nb::arg("outputs"), nb::arg("options"), nb::kw_only(),
              nb::arg("input_names"), nb::arg("output_names"), nb::arg("levels"), nb::arg("weights") = nb::none(),
              nb::arg("groups") = nb::none(), nb::arg("held_out") = std::vector<Eigen::Index>(),
-             nb::arg("may_have_codes") = true, nb::arg("readable_loss") = nb::none(), nb::arg("report") = nb::none());
+             nb::arg("may_have_codes") = true, nb::arg("readable_loss") = nb::none(), nb::arg("teach") = false,
+             nb::arg("report") = nb::none());
   module.def("accidental_inputs", &accidental, nb::arg("inputs"), nb::arg("levels"));
   module.def("dominant_rows", &dominant, nb::arg("output"));
   add_stream(module);

@@ -69,8 +69,12 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
     readable : bool or float, default=False
         Predict by the smallest crisp tree with short, rounded equations whose held-out error is at most 15 % (or this
         share) above that of the best crisp tree.
+    teach : bool, default=False
+        Fit the tree, and the readable one, to the answers of a sum of trees (`BoostedLocalLinearTreeRegressor`), on the
+        rows and on rows made of them, if that lowers the held-out error. `summary_["teaching"]` has the errors of the
+        tree alone, of the taught tree and of the sum. Takes several times as long.
     random_state : int, RandomState or None, default=None
-        Seed of the folds. None is 1, so that the same rows give the same model.
+        Seed of the folds, and of what teaches. None is 1, so that the same rows give the same model.
     n_jobs : int or None, default=None
         Threads; None and -1: all that the process may use. The model does not depend on it.
 
@@ -116,6 +120,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         monotonic_cst: Mapping[str, int] | Sequence[int] | None = None,
         shared_tree: bool = False,
         readable: bool | float = False,
+        teach: bool = False,
         random_state: Any = None,
         n_jobs: int | None = None,
     ) -> None:
@@ -134,6 +139,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         self.monotonic_cst = monotonic_cst
         self.shared_tree = shared_tree
         self.readable = readable
+        self.teach = teach
         self.random_state = random_state
         self.n_jobs = n_jobs
 
@@ -155,6 +161,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
                 held_out=rows.held_out,
                 may_have_codes=bool(self.integer_codes),
                 readable_loss=self._readable_loss(),
+                teach=bool(self.teach),
                 report=bar,
             )
         if self.loss == "squared":

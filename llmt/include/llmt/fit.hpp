@@ -71,6 +71,7 @@ class PreparedFit {
 
   /// For the library.
   const PreparedRows& rows() const;
+  PreparedFit with_rows(PreparedRows rows) const;
 
  private:
   struct Parts;

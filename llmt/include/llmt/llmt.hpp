@@ -32,4 +32,5 @@
 #include "llmt/stream.hpp"
 #include "llmt/stream_options.hpp"
 #include "llmt/summary.hpp"
+#include "llmt/teach.hpp"
 #include "llmt/training_data.hpp"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "base/parallel.hpp"
 
@@ -16,7 +17,10 @@ void TreeGrower::begin(const Eigen::VectorXd& residuals) {
   residuals_.resize(order_.size());
   weights_.resize(order_.size());
   terms_.resize(order_.size());
+  values_.resize(order_.size());
+  cells_.resize(order_.size());
   spare_order_.resize(order_.size());
+  spare_values_.resize(order_.size());
   spare_residuals_.resize(order_.size());
   spare_weights_.resize(order_.size());
   double weight = 0.0;
@@ -38,7 +42,24 @@ void TreeGrower::begin(const Eigen::VectorXd& residuals) {
 }
 
 void TreeGrower::pack(const GrowingNode& node) {
-  for (Eigen::Index k = node.begin; k < node.end; ++k) terms_[k] = packed(residuals_[k], weights_[k], units_);
+  const std::size_t count = node.count();
+  pack_rows(std::span(residuals_).subspan(node.begin, count), std::span(weights_).subspan(node.begin, count), units_,
+            std::span(terms_).subspan(node.begin, count));
+}
+
+void TreeGrower::gather(const GrowingNode& node, int feature) {
+  const std::uint16_t* const cells = rows_.features[feature].cells.data();
+  const float* const values = rows_.features[feature].values.data();
+  for (Eigen::Index k = node.begin; k < node.end; ++k) {
+    cells_[k] = cells[order_[k]];
+    values_[k] = values[order_[k]];
+  }
+}
+
+RowsInOrder TreeGrower::rows_of(const GrowingNode& node) const {
+  const std::size_t count = node.count();
+  return {std::span(weights_).subspan(node.begin, count), std::span(residuals_).subspan(node.begin, count),
+          std::span(values_).subspan(node.begin, count)};
 }
 
 std::vector<int> TreeGrower::some_features(Random& random) const {
@@ -97,21 +118,22 @@ TreeGrower::Choice TreeGrower::best_split(std::span<const int> leaves, const std
 
 void TreeGrower::split_rows(int index) {
   GrowingNode& node = tree_[index];
-  const std::vector<std::uint16_t>& cells = rows_.features[node.feature].cells;
   const bool has_weights = !rows_.equal_weights;
   // Rows of the right side wait in the same places of the spare lists: other nodes have other places.
   Eigen::Index left = node.begin;
   Eigen::Index right = node.begin;
   for (Eigen::Index k = node.begin; k < node.end; ++k) {
-    const std::uint16_t cell = cells[order_[k]];
-    const bool is_left = cell == missing_cell ? node.missing_left : cell <= node.cell;
+    const int cell = cells_[k];
+    const bool is_left = cell == missing_cell ? node.missing_left : cell <= node.cell;  // -1: missing too
     spare_order_[right] = order_[left] = order_[k];
+    spare_values_[right] = values_[left] = values_[k];
     spare_residuals_[right] = residuals_[left] = residuals_[k];
     if (has_weights) spare_weights_[right] = weights_[left] = weights_[k];
     left += is_left ? 1 : 0;
     right += is_left ? 0 : 1;
   }
   std::copy(spare_order_.begin() + node.begin, spare_order_.begin() + right, order_.begin() + left);
+  std::copy(spare_values_.begin() + node.begin, spare_values_.begin() + right, values_.begin() + left);
   std::copy(spare_residuals_.begin() + node.begin, spare_residuals_.begin() + right, residuals_.begin() + left);
   if (has_weights) {
     std::copy(spare_weights_.begin() + node.begin, spare_weights_.begin() + right, weights_.begin() + left);
@@ -125,23 +147,8 @@ void TreeGrower::split_rows(int index) {
 
 // The constant and the slope in the split's feature that the side's residuals ask for.
 void TreeGrower::add_to_path(GrowingNode& side, int feature) {
-  const std::vector<float>& values = rows_.features[feature].values;
   const bool has_slope = may_have_slope(side, feature);
-  double n = 0.0;
-  double s = 0.0;
-  double z = 0.0;
-  double zz = 0.0;
-  double ze = 0.0;
-  std::vector<double>& waiting = spare_residuals_;  // has nothing now in the places of these rows
-  for (Eigen::Index k = side.begin; k < side.end; ++k) {
-    const double w = weights_[k];
-    const double value = waiting[k] = values[order_[k]];
-    n += w;
-    s += w * residuals_[k];
-    z += w * value;
-    zz += w * value * value;
-    ze += w * value * residuals_[k];
-  }
+  const auto [n, s, z, zz, ze] = sum_rows(rows_of(side));
   if (n == 0.0) return;
   const double slope = has_slope ? (ze - z * s / n) / (std::max(0.0, zz - z * z / n) + options_.ridges.slope) : 0.0;
   const double constant = s / (n + options_.ridges.constant) - slope * z / n;
@@ -155,7 +162,8 @@ void TreeGrower::add_to_path(GrowingNode& side, int feature) {
       side.model.slopes[found - side.model.features.begin()] += slope;
     }
   }
-  for (Eigen::Index k = side.begin; k < side.end; ++k) residuals_[k] -= constant + slope * waiting[k];
+  for (Eigen::Index k = side.begin; k < side.end; ++k)
+    residuals_[k] -= constant + slope * static_cast<double>(values_[k]);
   if (is_searching_) pack(side);
 }
 
@@ -173,7 +181,9 @@ void TreeGrower::split(std::span<const int> leaves, std::span<const Choice> choi
     tree_.push_back(child);
     tree_.push_back(child);
   }
+  const bool is_gathered = std::exchange(is_gathered_, false);
   parallel_for(std::ssize(leaves), max_threads_, [&](Eigen::Index k) {
+    if (!is_gathered) gather(tree_[leaves[k]], choices[k].feature);
     split_rows(leaves[k]);
     GrowingNode& node = tree_[leaves[k]];
     add_to_path(tree_[node.left], node.feature);

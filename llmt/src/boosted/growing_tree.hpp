@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "boosted/binned_rows.hpp"
+#include "boosted/few.hpp"
 #include "boosted/packed_sums.hpp"
 #include "boosted/split_gain.hpp"
 #include "llmt/random.hpp"
@@ -27,8 +28,8 @@ struct TreeOptions {
 /// The model of a node: what the splits on the way to it added.
 struct PathModel {
   double constant = 0.0;
-  std::vector<int> features = {};
-  std::vector<double> slopes = {};
+  Few<int> features = {};
+  Few<double> slopes = {};
 
   double at(const BinnedRows& rows, Eigen::Index row) const {
     double value = constant;
@@ -106,7 +107,9 @@ class TreeGrower {
   std::vector<int> some_features(Random& random) const;
   Choice best_of_feature(std::span<const int> leaves, int feature) const;
   Choice best_split(std::span<const int> leaves, const std::vector<int>& features) const;
-  Choice refined(std::span<const int> leaves, Choice choice) const;
+  Choice refined(std::span<const int> leaves, Choice choice);
+  void gather(const GrowingNode& node, int feature);
+  RowsInOrder rows_of(const GrowingNode& node) const;
   bool may_have_slope(const GrowingNode& node, int feature) const;
   void split(std::span<const int> leaves, std::span<const Choice> choices);
   void split_rows(int node);
@@ -133,7 +136,11 @@ class TreeGrower {
   std::vector<double> weights_;    // in that order
   std::vector<PackedSum> terms_;   // in that order, while splits are searched
   bool is_searching_ = true;
+  std::vector<float> values_;  // of the feature that is split, in that order
+  std::vector<int> cells_;     // of that feature, before rows are divided; missing values at the end of their side
+  bool is_gathered_ = false;   // whether cells_ and values_ have the next split's
   std::vector<int> spare_order_;
+  std::vector<float> spare_values_;
   std::vector<double> spare_residuals_;
   std::vector<double> spare_weights_;
   PackedUnits units_;                // of the terms of a tree

@@ -34,12 +34,18 @@ struct PackedUnits {
 /// Units in which the sums over all rows stay within their bits.
 PackedUnits units_of(std::span<const double> residuals, std::span<const double> weights, bool equal_weights);
 
-inline PackedSum packed(double residual, double weight, const PackedUnits& units) {
-  const auto whole_weight = static_cast<std::int64_t>(weight * units.per_weight + 0.5);
+/// `Whole`: of 32 bits while `most` is within them, which compilers convert several at a time.
+template <class Whole = std::int64_t>
+PackedSum packed(double residual, double weight, const PackedUnits& units) {
+  const auto whole_weight = static_cast<Whole>(weight * units.per_weight + 0.5);
   const double units_of_residual = std::clamp(residual * weight * units.per_residual, -units.most, units.most);
-  const auto whole_residual = static_cast<std::int64_t>(units_of_residual + std::copysign(0.5, units_of_residual));
-  return (whole_weight << residual_bits) + whole_residual;
+  const auto whole_residual = static_cast<Whole>(units_of_residual + std::copysign(0.5, units_of_residual));
+  return (static_cast<PackedSum>(whole_weight) << residual_bits) + static_cast<PackedSum>(whole_residual);
 }
+
+/// packed() of some rows.
+void pack_rows(std::span<const double> residuals, std::span<const double> weights, const PackedUnits& units,
+               std::span<PackedSum> terms);
 
 inline std::int64_t weight_of(PackedSum sum) {
   return (sum + (std::int64_t{1} << (residual_bits - 1))) >> residual_bits;

@@ -28,7 +28,7 @@ struct SumsOfLeaf {
 
 }  // namespace
 
-TreeGrower::Choice TreeGrower::refined(std::span<const int> leaves, Choice choice) const {
+TreeGrower::Choice TreeGrower::refined(std::span<const int> leaves, Choice choice) {
   const BinnedFeature& column = rows_.features[choice.feature];
   // The window has the bins on both sides of the split.
   const auto bin = std::ranges::lower_bound(column.last_cells, choice.cell);
@@ -40,25 +40,32 @@ TreeGrower::Choice TreeGrower::refined(std::span<const int> leaves, Choice choic
   parallel_for(std::ssize(leaves), max_threads_, [&](Eigen::Index i) {
     const GrowingNode& node = tree_[leaves[i]];
     SumsOfLeaf& of_this = sums[i];
-    SideSums all;
-    SideSums left;
-    const std::uint16_t* const cells = column.cells.data();
-    const float* const values = column.values.data();
-    const int missing_at = choice.missing_left ? -1 : missing_cell;  // before or behind all cells
-    for (Eigen::Index k = node.begin; k < node.end; ++k) {
-      const int row = order_[k];
-      const int cell = cells[row] == missing_cell ? missing_at : cells[row];
-      const double w = weights_[k];
-      const double z = values[row];
-      all.add(w, residuals_[k], z);
-      left.add(cell < first ? w : 0.0, residuals_[k], z);  // without a branch, which no processor could foresee
-      if (cell >= first && cell <= last) of_leaf[i].push_back({cell, static_cast<int>(i), w, residuals_[k], z});
+    gather(node, choice.feature);
+    if (column.has_missing) {  // their cell lies before all others, or behind them
+      const int missing_at = choice.missing_left ? -1 : missing_cell;
+      for (Eigen::Index k = node.begin; k < node.end; ++k) {
+        if (cells_[k] == missing_cell) cells_[k] = missing_at;
+      }
+    }
+    const auto [all, left] = sum_sides(rows_of(node), std::span(cells_).subspan(node.begin, node.count()), first);
+    int* const found = spare_order_.data() + node.begin;  // has nothing now in the places of these rows
+    const int* const cells = cells_.data();
+    Eigen::Index count = 0;
+    for (int k = static_cast<int>(node.begin); k < node.end; ++k) {
+      found[count] = k;
+      count += static_cast<unsigned>(cells[k] - first) <= static_cast<unsigned>(last - first) ? 1 : 0;
+    }
+    of_leaf[i].reserve(count);
+    for (Eigen::Index n = 0; n < count; ++n) {
+      const int k = found[n];
+      of_leaf[i].push_back({cells_[k], static_cast<int>(i), weights_[k], residuals_[k], values_[k]});
     }
     of_this.all = all;
     of_this.left = left;
     of_this.slope = may_have_slope(node, choice.feature);
     of_this.gain = of_this.gain_of_sides(options_.ridges);
   });
+  is_gathered_ = true;
   std::vector<RowOfWindow> window;
   double gain = 0.0;
   for (std::size_t i = 0; i < leaves.size(); ++i) {

@@ -1,6 +1,8 @@
 #include "boosted/split_gain.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cstring>
 
 #include "base/simd.hpp"
 
@@ -12,7 +14,7 @@ namespace {
 struct RunningSums {
   int count = 0;
   std::array<int, most_bins + 1> bin;
-  std::array<int, most_bins> count_up_to;  // each bin of the feature
+  std::array<std::uint8_t, most_bins> count_up_to;  // each bin of the feature
   std::array<double, most_bins + 1> weight;
   std::array<double, most_bins + 1> residual;
   std::array<double, most_bins + 1> z;
@@ -20,6 +22,35 @@ struct RunningSums {
   std::array<double, most_bins + 1> ze;
   SideSums all = {};
 };
+
+// 1 for each bin that holds rows, else 0.
+LLMT_FOR_EACH_INSTRUCTION_SET
+void flag_bins(const PackedSum* histogram, std::uint8_t* __restrict flags) {
+  for (int b = 0; b < most_bins; ++b) flags[b] = histogram[b] != 0 ? 1 : 0;
+}
+
+// Lists the bins that hold rows. Flags are taken as the bytes of words: times `ones`, a byte has the sum of those up to
+// it; times `bits`, the highest byte has one bit for each.
+void find_bins(RunningSums& sums, const Histogram& histogram) {
+  static_assert(std::endian::native == std::endian::little && most_bins % 64 == 0);
+  constexpr std::uint64_t ones = 0x0101010101010101;
+  constexpr std::uint64_t bits = 0x0102040810204080;
+  std::array<std::uint8_t, most_bins> flags;
+  flag_bins(histogram.data(), flags.data());
+  auto count = static_cast<std::uint64_t>(sums.count);
+  for (int first = 0; first < most_bins; first += 64) {
+    std::uint64_t set = 0;
+    for (int b = 0; b < 64; b += 8) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, &flags[first + b], sizeof word);
+      const std::uint64_t up_to = (word + count) * ones;  // the first byte has those before the word too
+      std::memcpy(&sums.count_up_to[first + b], &up_to, sizeof up_to);
+      count = up_to >> 56;
+      set |= (word * bits >> 56) << b;
+    }
+    for (; set != 0; set &= set - 1) sums.bin[sums.count++] = first + std::countr_zero(set);
+  }
+}
 
 void run(RunningSums& sums, const BinnedFeature& feature, const Histogram& histogram, const PackedUnits& units,
          bool missing_left) {
@@ -35,13 +66,8 @@ void run(RunningSums& sums, const BinnedFeature& feature, const Histogram& histo
     sums.z[0] = sums.zz[0] = sums.ze[0] = 0.0;
     sums.count = 1;
   }
-  const int bins = feature.num_bins();
   const int first = sums.count;
-  for (int b = 0; b < bins; ++b) {
-    sums.bin[sums.count] = b;
-    sums.count += histogram[b] != 0 ? 1 : 0;
-    sums.count_up_to[b] = sums.count;
-  }
+  find_bins(sums, histogram);
   for (int k = first; k < sums.count; ++k) {
     const PackedSum sum = histogram[sums.bin[k]];
     const double weight = static_cast<double>(weight_of(sum)) * units.weight;

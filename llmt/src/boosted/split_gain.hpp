@@ -6,6 +6,7 @@
 
 #include "boosted/binned_rows.hpp"
 #include "boosted/packed_sums.hpp"
+#include "boosted/side_sums.hpp"
 
 namespace llmt {
 
@@ -13,26 +14,6 @@ namespace llmt {
 struct Ridges {
   double constant = 1.0;
   double slope = 1.0;
-};
-
-/// Sums over the rows on one side of a split: of weights w, of w e, w z, w z^2 and w z e.
-struct SideSums {
-  double weight = 0.0;
-  double residual = 0.0;
-  double z = 0.0;
-  double zz = 0.0;
-  double ze = 0.0;
-
-  void add(double w, double e, double of_z) {
-    weight += w;
-    residual += w * e;
-    z += w * of_z;
-    zz += w * of_z * of_z;
-    ze += w * of_z * e;
-  }
-  SideSums operator-(const SideSums& other) const {
-    return {weight - other.weight, residual - other.residual, z - other.z, zz - other.zz, ze - other.ze};
-  }
 };
 
 /// What the side explains, g in add_gains().

@@ -297,7 +297,8 @@ Training narrowed(const Training& training, const std::vector<int>& of_all,
           training.weighted,
           narrowed(training.all, of_all),
           narrowed(training.measured, of_all),
-          std::move(folds)};
+          std::move(folds),
+          training.taught};
 }
 
 }  // namespace llmt

@@ -93,18 +93,21 @@ Eigen::Index learned_rows(const KeptRows& kept);
 /// than once may be in several folds.
 std::vector<std::vector<Eigen::Index>> held_out_rows(const KeptRows& kept);
 
+struct TaughtTables;
+
 /// The rows of a fit in all forms that the stages of the fit read. Its parts share tables, so that it may be copied and
 /// moved.
 struct Training {
   FitOptions options;            ///< by which the columns are described
   std::vector<int> categorical;  ///< inputs, those with codes included
   std::shared_ptr<const KeptRows> kept;
-  SharedMatrix inputs;                    ///< of the kept rows, or positions where some inputs are codes
-  std::shared_ptr<const Table> table;     ///< with the weights that rows have in errors
-  std::shared_ptr<const Table> weighted;  ///< with the weights that rows have in training
-  TrainingRows all;                       ///< that the model is fitted to, of the table `weighted`
-  TrainingRows measured;                  ///< the same rows and columns with the weights of `table`
-  std::vector<FoldRows> folds;            ///< held-out rows are measured
+  SharedMatrix inputs;                                   ///< of the kept rows, or positions where some inputs are codes
+  std::shared_ptr<const Table> table;                    ///< with the weights that rows have in errors
+  std::shared_ptr<const Table> weighted;                 ///< with the weights that rows have in training
+  TrainingRows all;                                      ///< that the model is fitted to, of the table `weighted`
+  TrainingRows measured;                                 ///< the same rows and columns with the weights of `table`
+  std::vector<FoldRows> folds;                           ///< held-out rows are measured
+  std::shared_ptr<const TaughtTables> taught = nullptr;  ///< what `all` and `folds` learn from; null: `weighted`
 
   Eigen::Index outputs() const { return table->outputs.cols(); }
 };

@@ -92,6 +92,21 @@ std::vector<Eigen::Index> used_coefficients(const Node& node) {
 
 }  // namespace
 
+void count_rows(const TrainingRows& rows, Partition& partition) {
+  const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
+  for (Node& node : partition.nodes) node.samples = 0;
+  for (Eigen::Index block = 0; block < num_chunks(rows); ++block) {
+    const Chunk chunk = fetch(rows, block, {});
+    for (Eigen::Index row = 0; row < chunk.count(); ++row) {
+      int at = 0;
+      for (; !partition.nodes[at].is_leaf(); at = evaluator.child_of(at, chunk.inputs.row(row).data())) {
+        ++partition.nodes[at].samples;
+      }
+      ++partition.nodes[at].samples;
+    }
+  }
+}
+
 Eigen::MatrixXd inverse_gram(const Eigen::MatrixXd& gram, const Eigen::VectorXd& scale) {
   const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * gram * scale.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);

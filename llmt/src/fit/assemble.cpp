@@ -108,6 +108,7 @@ FittedPartition finish(const ChosenInputs& inputs, const Plan& plan, const Final
   finishing.did(share_of_folds);
   partition.output_range = output_range(guards, served, training.all);
   describe_leaves(training.measured, partition, candidate.sparse, threads, finishing);
+  if (training.taught != nullptr) count_rows(training.measured, partition);
   finishing.finish();
   PartitionSummary summary = describe(partition, training.measured, candidate.sparse);
   summary.grown_leaves = grown_leaves;

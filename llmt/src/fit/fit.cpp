@@ -57,6 +57,12 @@ const TrainingData& PreparedFit::data() const { return *parts_->data; }
 
 const PreparedRows& PreparedFit::rows() const { return parts_->rows; }
 
+PreparedFit PreparedFit::with_rows(PreparedRows rows) const {
+  PreparedFit result = *this;
+  result.parts_ = std::make_shared<const Parts>(Parts{parts_->data, std::move(rows)});
+  return result;
+}
+
 Eigen::VectorXd rmse(const Eigen::Ref<const Eigen::MatrixXd>& predicted,
                      const Eigen::Ref<const Eigen::MatrixXd>& measured) {
   if (predicted.rows() != measured.rows() || predicted.cols() != measured.cols() || predicted.rows() == 0) {

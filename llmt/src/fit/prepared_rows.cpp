@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "data/lessons.hpp"
 #include "fit/missing_weights.hpp"
 #include "growth/rules/rule.hpp"
 
@@ -25,7 +26,10 @@ std::shared_ptr<const Training> with_terms(const std::shared_ptr<const Training>
   if (training->options.terms == terms) return training;
   FitOptions options = training->options;
   options.terms = terms;
-  return describe_columns(training->kept, training->inputs, training->categorical, options, work);
+  std::shared_ptr<const Training> result =
+      describe_columns(training->kept, training->inputs, training->categorical, options, work);
+  const std::shared_ptr<const Lessons> lessons = lessons_of(*training);
+  return lessons == nullptr ? result : std::make_shared<const Training>(taught(*result, lessons));
 }
 
 }  // namespace llmt
