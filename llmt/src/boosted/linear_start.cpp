@@ -1,6 +1,6 @@
 #include "boosted/linear_start.hpp"
 
-#include <Eigen/SVD>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,29 +12,40 @@ Eigen::VectorXd column_of(const BinnedFeature& feature) {
   return Eigen::Map<const Eigen::VectorXf>(feature.values.data(), std::ssize(feature.values)).cast<double>();
 }
 
-// With A = sqrt(W) Z = U D V', Z and y centred, the leverage of one of the w equal rows behind row i is
-// H_i = (sum of U_ik^2 D_k^2 / (D_k^2 + p)) / w_i + 1 / sum(w), and its leave-one-out residual e_i / (1 - H_i).
+// The eigenvectors of A'A, or, if there are fewer rows than columns, those of them that A does not map to 0.
+Eigen::MatrixXd directions_of(const Eigen::MatrixXd& a) {
+  using Solver = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
+  if (a.cols() <= a.rows()) return Solver(a.transpose() * a).eigenvectors();
+  Eigen::MatrixXd directions = a.transpose() * Solver(a * a.transpose()).eigenvectors();
+  directions.colwise().normalize();  // leaves a column of zeros
+  return directions;
+}
+
+// With A = sqrt(W) Z, Z and y centred, V the directions above and T = A V, whose columns are orthogonal with the
+// squares D_k^2: the slopes are V (T'T + p I)^-1 T' sqrt(W) y, the leverage of one of the w_i equal rows behind row i
+// is H_i = sum of T_ik^2 / (D_k^2 + p) / w_i + 1 / sum(w), and its leave-one-out residual e_i / (1 - H_i).
 Eigen::VectorXd ridge_slopes(const Eigen::MatrixXd& z, const Eigen::VectorXd& y, const Eigen::VectorXd& weights) {
-  const Eigen::ArrayXd roots = weights.array().sqrt();
-  const Eigen::VectorXd scaled = (y.array() * roots).matrix();
-  const Eigen::BDCSVD<Eigen::MatrixXd> svd(z.array().colwise() * roots, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const Eigen::MatrixXd& u = svd.matrixU();
-  const Eigen::ArrayXd squares = svd.singularValues().array().square();
-  const Eigen::VectorXd along = u.transpose() * scaled;
+  const Eigen::VectorXd roots = weights.cwiseSqrt();
+  const Eigen::MatrixXd a = roots.asDiagonal() * z;
+  const Eigen::VectorXd scaled = roots.cwiseProduct(y);
+  const Eigen::MatrixXd directions = directions_of(a);
+  const Eigen::MatrixXd t = a * directions;
+  const Eigen::ArrayXd squares = t.colwise().squaredNorm().transpose();
+  const Eigen::ArrayXd along = t.transpose() * scaled;
   const double weight = weights.sum();
   Eigen::VectorXd slopes = Eigen::VectorXd::Zero(z.cols());
   double best = std::numeric_limits<double>::infinity();
   for (int step = -10; step <= 4; ++step) {
     const double penalty = weight * std::pow(10.0, 0.5 * step);
-    const Eigen::ArrayXd kept = squares / (squares + penalty);
-    const Eigen::ArrayXd left = scaled.array() - (u * (kept * along.array()).matrix()).array();
-    const Eigen::ArrayXd leverages =
-        (u.array().square().matrix() * kept.matrix()).array() / weights.array() + 1.0 / weight;
+    const Eigen::VectorXd inverse = (squares + penalty).inverse();
+    const Eigen::VectorXd terms = inverse.array() * along;
+    const Eigen::ArrayXd left = scaled - t * terms;
+    const Eigen::ArrayXd leverages = (t.cwiseAbs2() * inverse).array() / weights.array() + 1.0 / weight;
     constexpr double least = 1e-6;  // a row that the fit goes through has no residual to speak of
     const double error = (left / (1.0 - leverages).max(least)).square().sum();
     if (error >= best) continue;
     best = error;
-    slopes = svd.matrixV() * (svd.singularValues().array() / (squares + penalty) * along.array()).matrix();
+    slopes = directions * terms;
   }
   return slopes;
 }
