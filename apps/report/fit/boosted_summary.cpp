@@ -2,7 +2,24 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace llmt::report {
+namespace {
+
+bool is_blend(const BoostSummary& summary) { return summary.variant == "blend"; }
+
+std::string blend_text(const std::string& target, const BoostSummary& summary) {
+  std::string text = fmt::format("{} is a blend, held-out errors in brackets:", target);
+  for (const BoostVariant& variant : summary.compared) {
+    if (variant.share == 0.0) continue;
+    text += fmt::format(" {:.0f} % {} ({}),", 100.0 * variant.share, variant.name, number(variant.rmse));
+  }
+  text.back() = '.';
+  return text + "\n";
+}
+
+}  // namespace
 
 Json boosted_json(const BoostedRun& run, const BoostResult& result) {
   Json json = {{"data", run.data}, {"rule", "boost"}, {"inputs", Json::array()}, {"sums", Json::array()}};
@@ -11,7 +28,7 @@ Json boosted_json(const BoostedRun& run, const BoostResult& result) {
     const BoostSummary& summary = result.summaries[o];
     Json compared = Json::array();
     for (const BoostVariant& variant : summary.compared) {
-      compared.push_back({{"name", variant.name}, {"rmse", finite_or_null(variant.rmse)}});
+      compared.push_back({{"name", variant.name}, {"rmse", finite_or_null(variant.rmse)}, {"share", variant.share}});
     }
     json["sums"].push_back({{"target", result.model.outputs()[o].name},
                             {"rows", summary.rows},
@@ -38,11 +55,17 @@ std::string boosted_text(const BoostedRun& run, const BoostResult& result, std::
                fmt::format("{}", summary.held_out)});
   }
   text += table.text(width);
-  return text +
-         wrapped(
-             "The held-out error is of trees fitted without those rows; they also decided when boosting stopped, "
-             "so it is slightly too small.\n",
-             width);
+  for (std::size_t o = 0; o < result.summaries.size(); ++o) {
+    if (is_blend(result.summaries[o])) {
+      text += wrapped(blend_text(result.model.outputs()[o].name, result.summaries[o]), width);
+    }
+  }
+  const bool is_of_all = std::ranges::all_of(result.summaries, is_blend);
+  return text + wrapped(is_of_all
+                            ? "The held-out error is of the whole fit, repeated without a fifth of the rows in turn.\n"
+                            : "The held-out error is of trees fitted without those rows; they also decided when "
+                              "boosting stopped, so it is slightly too small.\n",
+                        width);
 }
 
 }  // namespace llmt::report

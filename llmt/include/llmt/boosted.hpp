@@ -34,10 +34,12 @@ struct BoostOptions {
   bool mean_of_few = false;  ///< of fewer than `fewest_boosted_rows` different rows: their mean, in place of an error
 };
 
-/// A variant of the trees, and its error on the held-out rows after the same few rounds as the others.
+/// A variant of the trees that was compared on held-out rows: after the same few rounds as the others, or, below 500
+/// rows, when all trees are there.
 struct BoostVariant {
   std::string name;  ///< "symmetric", "free", "symmetric with pairs", ...
   double rmse = 0.0;
+  double share = 0.0;  ///< of the sum
 };
 
 /// How the sum of one output was made.
@@ -45,8 +47,8 @@ struct BoostSummary {
   Eigen::Index rows = 0;               ///< that the sum is fitted to; equal rows count once
   Eigen::Index held_out = 0;           ///< rows that decided the variant and the number of trees
   double rmse = 0.0;                   ///< on these, of the trees fitted without them, in the output's unit; or NaN
-  std::string variant;                 ///< the one taken; "mean": no trees, see BoostOptions::mean_of_few
-  std::vector<BoostVariant> compared;  ///< empty below 5000 rows: symmetric trees
+  std::string variant;                 ///< the one taken; "blend": a mean; "mean": see BoostOptions::mean_of_few
+  std::vector<BoostVariant> compared;  ///< empty from 500 to 5000 rows: symmetric trees
   Eigen::Index trees = 0;
   double train_rmse = 0.0;
 };
@@ -60,7 +62,9 @@ struct BoostResult {
 ///
 /// A fifth of the rows is held out, whole groups of them. They decide which trees are taken and when boosting stops.
 /// Then the sum is fitted to all rows with a quarter more trees. With TrainingData::held_out these rows decide instead,
-/// and the sum of the other rows is the result.
+/// and the sum of the other rows is the result. Below 500 rows each fifth is held out in turn, and the sum is a
+/// weighted mean of four variants; its error is that of the whole procedure, shares and number of trees chosen without
+/// the row.
 ///
 /// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
 ///

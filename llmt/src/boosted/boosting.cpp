@@ -38,6 +38,7 @@ Rounds boost(const BinnedRows& rows, const Eigen::VectorXd& output, const std::v
   if (!held_out.empty()) {
     best = rmse_of(residuals, rows.weights, held_out);
     result.residuals = residuals(held_out);
+    if (options.keep_path) result.path.push_back(result.residuals);
   }
   for (int round = 1; round <= options.most_rounds; ++round) {
     work.did(1.0 / options.most_rounds);
@@ -52,6 +53,7 @@ Rounds boost(const BinnedRows& rows, const Eigen::VectorXd& output, const std::v
         residuals(held_out[k]) -= options.rate * value_at(tree, rows, held_out[k]);
       }
     });
+    if (options.keep_path) result.path.push_back(residuals(held_out));
     const double error = rmse_of(residuals, rows.weights, held_out);
     if (error < best * (1.0 - 1e-9)) {
       best = error;
@@ -61,7 +63,9 @@ Rounds boost(const BinnedRows& rows, const Eigen::VectorXd& output, const std::v
     if (round - best_round >= options.patience) break;
   }
   result.train_rmse = rmse_of(residuals, rows.weights, train);
-  if (!held_out.empty()) {
+  if (held_out.empty()) {
+    result.residuals = residuals(train);
+  } else {
     result.trees.resize(best_round);
     result.rmse = best;
   }

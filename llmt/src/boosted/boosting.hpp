@@ -10,11 +10,16 @@
 
 namespace llmt {
 
+inline constexpr double usual_softness = 0.6;  ///< TreeOptions::softness of soft trees
+inline constexpr double soft_rate = 0.1;       ///< of soft trees
+inline constexpr double more_trees = 1.25;     ///< on all rows, by those that held-out rows asked for
+
 struct RoundOptions {
   TreeOptions tree = {};
   double rate = 0.1;
   int most_rounds = 2000;
-  int patience = 50;  ///< rounds without a smaller error on held-out rows after which boosting stops
+  int patience = 50;       ///< rounds without a smaller error on held-out rows after which boosting stops
+  bool keep_path = false;  ///< Rounds::path is wanted
   int max_threads = 0;
 };
 
@@ -22,9 +27,10 @@ struct RoundOptions {
 struct Rounds {
   double base = 0.0;
   std::vector<GrowingTree> trees;
-  double rmse = 0.0;               ///< on the held-out rows, of these trees; NaN without such rows
-  Eigen::VectorXd residuals = {};  ///< of the held-out rows, of these trees
-  double train_rmse = 0.0;         ///< on the others; with held-out rows, after the last round that was tried
+  double rmse = 0.0;                       ///< on the held-out rows, of these trees; NaN without such rows
+  Eigen::VectorXd residuals = {};          ///< of the held-out rows, of these trees; without such rows, of the others
+  std::vector<Eigen::VectorXd> path = {};  ///< of the held-out rows, before the first round and after each one tried
+  double train_rmse = 0.0;                 ///< on the others; with held-out rows, after the last round that was tried
 };
 
 /// Boosts on the rows `train` until the error on `held_out` has not become smaller for `patience` rounds, and keeps the

@@ -2,10 +2,11 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <optional>
 
+#include "boosted/blend.hpp"
 #include "boosted/boosting.hpp"
 #include "boosted/boosting_data.hpp"
+#include "boosted/sum_parts.hpp"
 #include "llmt/boosted.hpp"
 
 namespace llmt {
@@ -19,10 +20,7 @@ constexpr Eigen::Index most_raced = 10000;  // rows that trees of the race learn
 constexpr Eigen::Index raced_part = 4;      // a quarter of the rows, if that is more
 constexpr int patience_of_few = 200;        // below enough_for_races, whose few held-out rows err
 constexpr double race_rate = 0.3;
-constexpr double soft_rate = 0.1;
-constexpr double softness = 0.6;
 constexpr int most_paired = 4;        // inputs whose sums and differences are tried
-constexpr double more_trees = 1.25;   // on all rows, by those that the held-out rows asked for
 constexpr double free_margin = 0.25;  // of 1 / sqrt(held-out rows): by how much a variant must be better
 constexpr double soft_margin = 1.0;
 
@@ -114,8 +112,11 @@ class OutputFit {
     }
     if (options_.rate > 0.0) rounds_.rate = options_.rate;
     rounds_.most_rounds = options_.max_rounds;
-    BoostedSum sum = finish(summary, work);
-    sum.residuals = ascending(std::move(residuals_));
+    const std::vector<SumPart> members = data_.hold_outs.size() > 1 ? finish_few(summary, work) : finish(summary, work);
+    BoostedSum sum = sum_of(members, data_.rows, mean_, scale_);
+    summary.trees = std::ssize(sum.trees);
+    const Eigen::VectorXd absolute = scale_ * residuals_.cwiseAbs();
+    sum.residuals = ascending({absolute.begin(), absolute.end()});
     return sum;
   }
 
@@ -155,7 +156,7 @@ class OutputFit {
     best = race_pairs(symmetric, best, summary, work);
     variant = rounds_;
     variant.tree.symmetric = true;
-    variant.tree.softness = softness;
+    variant.tree.softness = usual_softness;
     const bool paired = data_.rows.features.size() > usual_;
     const std::string name = paired ? "soft with pairs" : "soft";
     if (race(variant, name, summary, work).rmse < best * (1.0 - soft_margin * noise)) {
@@ -190,56 +191,44 @@ class OutputFit {
     return error;
   }
 
-  BoostedSum finish(BoostSummary& summary, Work& work) {
-    Rounds rounds;
-    double squares = 0.0;
-    double held_out = 0.0;
-    double trees = 0.0;
-    const double share = (data_.is_hold_out_given ? 1.0 : 0.5) / static_cast<double>(data_.hold_outs.size());
-    const double left = work.left();
-    for (const HoldOut& rows : data_.hold_outs) {
-      Work part(work, share * left);
-      rounds = boost(data_.rows, y_, rows.train, rows.held_out, {}, rounds_, random_, part);
-      for (const double residual : rounds.residuals) residuals_.push_back(std::abs(residual) * scale_);
-      const double weight = data_.rows.weights(rows.held_out).sum();
-      squares += weight * rounds.rmse * rounds.rmse;
-      held_out += weight;
-      trees += static_cast<double>(rounds.trees.size()) / static_cast<double>(data_.hold_outs.size());
-      summary.held_out += std::ssize(rows.held_out);
-    }
-    std::vector<int> fitted = data_.hold_outs.front().train;
+  // One variant, stopped by one set of held-out rows.
+  std::vector<SumPart> finish(BoostSummary& summary, Work& work) {
+    const HoldOut& rows = data_.hold_outs.front();
+    SumPart sum{.rate = rounds_.rate, .rounds = {}};
+    Work stopping(work, (data_.is_hold_out_given ? 1.0 : 0.5) * work.left());
+    sum.rounds = boost(data_.rows, y_, rows.train, rows.held_out, {}, rounds_, random_, stopping);
+    summary.rmse = sum.rounds.rmse * scale_;
+    summary.held_out = std::ssize(rows.held_out);
+    summary.rows = std::ssize(rows.train);
+    residuals_ = sum.rounds.residuals;
     if (!data_.is_hold_out_given) {
-      fitted.resize(y_.size());
-      std::iota(fitted.begin(), fitted.end(), 0);
-      RoundOptions all = rounds_;
-      all.most_rounds = static_cast<int>(std::ceil(more_trees * std::round(trees)));
+      summary.rows = y_.size();
+      std::vector<int> all(y_.size());
+      std::iota(all.begin(), all.end(), 0);
+      RoundOptions more = rounds_;
+      more.most_rounds = static_cast<int>(std::ceil(more_trees * static_cast<double>(sum.rounds.trees.size())));
       const bool keep = rounds_.tree.symmetric && y_.size() >= enough_for_races;
+      const std::vector<GrowingTree> kept = keep ? sum.rounds.trees : std::vector<GrowingTree>();
       Work part(work, work.left());
-      rounds = boost(data_.rows, y_, fitted, {}, keep ? rounds.trees : std::vector<GrowingTree>(), all, random_, part);
+      sum.rounds = boost(data_.rows, y_, all, {}, kept, more, random_, part);
     }
-    summary.rows = std::ssize(fitted);
-    summary.rmse = std::sqrt(squares / held_out) * scale_;
     summary.variant = name_;
-    summary.trees = std::ssize(rounds.trees);
-    summary.train_rmse = rounds.train_rmse * scale_;
-    return in_units(rounds);
+    for (BoostVariant& variant : summary.compared) variant.share = variant.name == name_ ? 1.0 : 0.0;
+    summary.train_rmse = sum.rounds.train_rmse * scale_;
+    return {sum};
   }
 
-  // In the unit of the output.
-  BoostedSum in_units(const Rounds& rounds) const {
-    BoostedSum sum{.base = mean_ + scale_ * rounds.base, .rate = rounds_.rate, .features = {}, .trees = {}};
-    for (const BinnedFeature& feature : data_.rows.features) sum.features.push_back(feature.feature);
-    for (const GrowingTree& growing : rounds.trees) {
-      BoostedTree tree = finished(growing, data_.rows);
-      for (BoostedLeaf& leaf : tree.leaves) {
-        leaf.constant *= scale_;
-        leaf.low *= scale_;
-        leaf.high *= scale_;
-        for (double& slope : leaf.slopes) slope *= scale_;
-      }
-      sum.trees.push_back(std::move(tree));
-    }
-    return sum;
+  // Few rows: every fold is held out in turn.
+  std::vector<SumPart> finish_few(BoostSummary& summary, Work& work) {
+    Blend mean = blend(data_, y_, rounds_, options_.rate > 0.0, random_, work);
+    residuals_ = mean.residuals;
+    summary.rmse = scale_ * std::sqrt(residuals_.cwiseAbs2().dot(data_.rows.weights) / data_.rows.weights.sum());
+    summary.train_rmse = scale_ * mean.train_rmse;
+    summary.rows = summary.held_out = y_.size();
+    summary.variant = "blend";
+    summary.compared = std::move(mean.variants);
+    for (BoostVariant& variant : summary.compared) variant.rmse *= scale_;
+    return std::move(mean.parts);
   }
 
   BoostingData& data_;
@@ -250,8 +239,8 @@ class OutputFit {
   double scale_ = 1.0;
   RoundOptions rounds_;
   std::string name_;
-  std::vector<double> residuals_;  // of held-out rows, absolute
-  std::size_t usual_ = 0;          // features without pairs
+  Eigen::VectorXd residuals_;  // of held-out rows
+  std::size_t usual_ = 0;      // features without pairs
 };
 
 }  // namespace

@@ -51,7 +51,7 @@ llmt::TrainingData mixed(Eigen::Index rows) {
 }
 
 TEST(BoostedModel, PredictsTheSumOfItsTreesToTheBit) {
-  const llmt::TrainingData data = mixed(400);
+  const llmt::TrainingData data = mixed(600);  // so many have crisp trees alone, whose sums have one order
   const llmt::BoostedModel model = llmt::fit_boosted(data, {.max_rounds = 30}).model;
   const Eigen::MatrixXd predicted = model.predict(data.inputs, 2);
   int blends = 0;
@@ -287,7 +287,7 @@ void expect_fault(const std::string& text, const std::string& words) {
 
 TEST(BoostedFile, SaysWhereItIsWrong) {
   using Json = nlohmann::ordered_json;
-  const llmt::TrainingData data = mixed(200);
+  const llmt::TrainingData data = mixed(600);
   const Json good = Json::parse(to_json(llmt::fit_boosted(data, {.max_rounds = 3}).model));
   const auto changed = [&](const std::string& pointer, const Json& value) {
     Json bad = good;

@@ -1,0 +1,170 @@
+#include "boosted/blend.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "boosted/linear_start.hpp"
+
+namespace llmt {
+namespace {
+
+struct Variant {
+  std::string name;
+  RoundOptions rounds;
+  bool has_start = false;
+};
+
+std::vector<Variant> variants_of(const RoundOptions& usual, bool is_rate_given) {
+  RoundOptions constant = usual;
+  constant.tree.slopes = 0;
+  RoundOptions soft = usual;
+  soft.tree.softness = usual_softness;
+  if (!is_rate_given) soft.rate = soft_rate;
+  return {
+      {"symmetric", usual}, {"constant leaves", constant}, {"soft", soft}, {"soft from a linear model", soft, true}};
+}
+
+// A variant in all folds.
+struct Folds {
+  std::vector<double> rounds;                      // that were best in each
+  std::vector<std::vector<Eigen::VectorXd>> path;  // residuals of its held-out rows, by rounds
+
+  double mean_rounds(std::size_t without) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < rounds.size(); ++k) sum += k == without ? 0.0 : rounds[k];
+    return sum / static_cast<double>(rounds.size() - (without < rounds.size() ? 1 : 0));
+  }
+
+  // With as many rounds as the other folds ask for, since its own would flatter.
+  const Eigen::VectorXd& residuals(std::size_t fold) const {
+    const auto asked = static_cast<std::size_t>(std::round(mean_rounds(fold)));
+    return path[fold][std::min(asked, path[fold].size() - 1)];
+  }
+};
+
+constexpr std::size_t no_fold = std::numeric_limits<std::size_t>::max();
+
+class BlendFit {
+ public:
+  BlendFit(const BoostingData& data, const Eigen::VectorXd& output, Random& random)
+      : data_(data), output_(output), random_(random) {
+    all_.resize(output.size());
+    std::iota(all_.begin(), all_.end(), 0);
+  }
+
+  Folds in_folds(const Variant& variant, Work& work) {
+    Folds folds;
+    for (const HoldOut& rows : data_.hold_outs) {
+      Work part(work, work.left() / static_cast<double>(data_.hold_outs.size() - folds.rounds.size()));
+      RoundOptions options = variant.rounds;
+      options.keep_path = true;
+      const Rounds rounds = boost(data_.rows, left_of(start_of(variant, rows.train)), rows.train, rows.held_out, {},
+                                  options, random_, part);
+      folds.rounds.push_back(static_cast<double>(rounds.trees.size()));
+      folds.path.push_back(rounds.path);
+    }
+    return folds;
+  }
+
+  SumPart on_all(const Variant& variant, double rounds, Work& work) {
+    SumPart part{.rate = variant.rounds.rate, .rounds = {}, .start = start_of(variant, all_)};
+    RoundOptions options = variant.rounds;
+    options.most_rounds = static_cast<int>(std::ceil(more_trees * std::round(rounds)));
+    part.rounds = boost(data_.rows, left_of(part.start), all_, {}, {}, options, random_, work);
+    return part;
+  }
+
+ private:
+  std::vector<BoostedLeaf> start_of(const Variant& variant, const std::vector<int>& train) const {
+    return variant.has_start ? linear_start(data_.rows, output_, train) : std::vector<BoostedLeaf>();
+  }
+  Eigen::VectorXd left_of(const std::vector<BoostedLeaf>& start) const {
+    return output_ - values_of(start, data_.rows);
+  }
+
+  const BoostingData& data_;
+  const Eigen::VectorXd& output_;
+  Random& random_;
+  std::vector<int> all_;
+};
+
+double rmse_of(const Eigen::VectorXd& residuals, const Eigen::VectorXd& weights) {
+  return std::sqrt(residuals.cwiseAbs2().dot(weights) / weights.sum());
+}
+
+}  // namespace
+
+Eigen::VectorXd shares_of(const Eigen::MatrixXd& residuals, const Eigen::VectorXd& weights,
+                          const std::vector<int>& rows) {
+  const Eigen::Index count = residuals.cols();
+  const Eigen::MatrixXd e = residuals(rows, Eigen::all);
+  const Eigen::VectorXd w = weights(rows);
+  Eigen::MatrixXd products = e.transpose() * w.asDiagonal() * e / w.sum();
+  const double smallest = products.diagonal().minCoeff();
+  if (!(smallest > 0.0)) {  // variants without error
+    const Eigen::VectorXd exact = (products.diagonal().array() <= 0.0).cast<double>();
+    return exact / exact.sum();
+  }
+  products.diagonal().array() += smallest / std::sqrt(static_cast<double>(rows.size()));
+  // Of a set of variants the best shares are a = P^-1 1 / (1'P^-1 1), with the value 1 / (1'P^-1 1). The best set whose
+  // shares are not negative has the smallest value.
+  Eigen::VectorXd best = Eigen::VectorXd::Zero(count);
+  double most = 0.0;
+  for (unsigned set = 1; set < 1U << count; ++set) {
+    std::vector<Eigen::Index> in;
+    for (Eigen::Index k = 0; k < count; ++k) {
+      if ((set >> k & 1U) != 0) in.push_back(k);
+    }
+    const Eigen::VectorXd shares = products(in, in).llt().solve(Eigen::VectorXd::Ones(std::ssize(in)));
+    if (shares.minCoeff() < 0.0 || shares.sum() <= most) continue;
+    most = shares.sum();
+    best.setZero();
+    best(in) = shares / most;
+  }
+  return best;
+}
+
+Blend blend(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, bool is_rate_given,
+            Random& random, Work& work) {
+  const std::vector<Variant> variants = variants_of(usual, is_rate_given);
+  BlendFit fit(data, output, random);
+  std::vector<Folds> folds;
+  Eigen::MatrixXd residuals(output.size(), std::ssize(variants));
+  Blend result;
+  Work searching(work, 0.8);
+  for (const Variant& variant : variants) {
+    Work part(searching, searching.left() / static_cast<double>(variants.size() - folds.size()));
+    folds.push_back(fit.in_folds(variant, part));
+    auto column = residuals.col(std::ssize(folds) - 1);
+    for (std::size_t k = 0; k < data.hold_outs.size(); ++k)
+      column(data.hold_outs[k].held_out) = folds.back().residuals(k);
+    result.variants.push_back({.name = variant.name, .rmse = rmse_of(column, data.rows.weights)});
+  }
+  result.residuals.resize(output.size());
+  for (const HoldOut& rows : data.hold_outs) {  // with the shares that the other folds ask for
+    const Eigen::VectorXd shares = shares_of(residuals, data.rows.weights, rows.train);
+    result.residuals(rows.held_out) = residuals(rows.held_out, Eigen::all) * shares;
+  }
+  std::vector<int> all(output.size());
+  std::iota(all.begin(), all.end(), 0);
+  const Eigen::VectorXd shares = shares_of(residuals, data.rows.weights, all);
+  Eigen::VectorXd left = Eigen::VectorXd::Zero(output.size());
+  for (std::size_t k = 0; k < variants.size(); ++k) {
+    result.variants[k].share = shares(static_cast<Eigen::Index>(k));
+    if (result.variants[k].share == 0.0) continue;
+    Work part(work, work.left() / static_cast<double>(variants.size() - k));
+    SumPart of_variant = fit.on_all(variants[k], folds[k].mean_rounds(no_fold), part);
+    of_variant.share = result.variants[k].share;
+    left += of_variant.share * of_variant.rounds.residuals;
+    result.parts.push_back(std::move(of_variant));
+  }
+  result.train_rmse = rmse_of(left, data.rows.weights);
+  return result;
+}
+
+}  // namespace llmt
