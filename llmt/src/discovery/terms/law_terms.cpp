@@ -113,6 +113,16 @@ ModelTerm coulomb_stribeck(const InputView& input) {
   return term;
 }
 
+// A valve's flow has p = 0.5.
+ModelTerm signed_power(const InputView& input) {
+  std::vector<double> tried;
+  for (double p = 0.2; p < 3.05; p += 0.15) tried.push_back(p);
+  return law(
+      input, "signed_power", fmt::format("sign({0}) |{0}|^p", input.name), "coefficient",
+      fmt::format("{}^p", input.name), {smooth("p", "1", std::move(tried))}, "sign($1)*abs($1)^$c",
+      [](const Eigen::ArrayXd& x, const Eigen::VectorXd& p) -> Eigen::ArrayXd { return x.sign() * x.abs().pow(p(0)); });
+}
+
 // What an actuator or a sensor that stops at +-c gives, and what one gives that begins beyond +-c.
 std::vector<ModelTerm> two_sided(const InputView& input) {
   const std::string& x = input.name;
@@ -160,6 +170,7 @@ std::vector<ModelTerm> law_terms(const InputView& input) {
   }
   if (changes_sign(input)) {
     terms.push_back(coulomb_stribeck(input));
+    terms.push_back(signed_power(input));
     for (ModelTerm& term : two_sided(input)) terms.push_back(std::move(term));
   }
   return terms;

@@ -37,7 +37,7 @@ std::vector<ModelTerm> shapes_of(const std::vector<InputView>& inputs);
 /// Terms with a constant that is searched, of one input.
 std::vector<ModelTerm> searched_terms(const InputView& input);
 
-/// Laws of one input that contain simpler terms: sigmoid, Hill's law, a power, Coulomb's and Stribeck's friction, a
+/// Laws of one input that contain simpler terms: sigmoid, Hill's law, powers, Coulomb's and Stribeck's friction, a
 /// limit on both sides, a dead band.
 std::vector<ModelTerm> law_terms(const InputView& input);
 

@@ -173,9 +173,6 @@ void add_functions(const InputView& input, std::vector<ModelTerm>& terms) {
       terms.push_back(function_term(
           input, "signed_square", fmt::format("{0} |{0}|", x), x + "^2", [](double v) { return v * std::abs(v); },
           "$1*abs($1)"));
-      terms.push_back(function_term(
-          input, "signed_root", fmt::format("sign({0}) sqrt(|{0}|)", x), x + "^0.5",
-          [](double v) { return std::copysign(std::sqrt(std::abs(v)), v); }, "sign($1)*sqrt(abs($1))"));
     }
   }
   if (input.low >= 0.0 && levels > 3) {
@@ -207,7 +204,7 @@ int complexity_of(const ModelTerm& term) {
                                                        {"log", 4},
                                                        {"reciprocal", 4},
                                                        {"signed_square", 4},
-                                                       {"signed_root", 4},
+                                                       {"signed_power", 9},
                                                        {"gain_curvature", 4},
                                                        {"harmonic1", 5},
                                                        {"harmonic2", 5},
