@@ -191,9 +191,15 @@ Missing Alternatives::plain_for_searched(Missing found) const {
     if (!term.generic && term.constants.size() > 0 && term.inputs.size() == 1) places.insert(term.inputs);
   }
   for (const std::vector<std::string>& place : places) {
-    Missing plain =
-        without(*refuted_, [&](const ModelTerm& term) { return term.inputs == place && !term.constants.empty(); });
-    if (plain.found.empty() || std::ranges::any_of(plain.found, &FoundTerm::generic)) continue;
+    const auto is_searched = [&](const ModelTerm& term) { return term.inputs == place && !term.constants.empty(); };
+    const auto has_shapes = [](const Missing& missing) {
+      return std::ranges::any_of(missing.found, &FoundTerm::generic);
+    };
+    Missing plain = without(*refuted_, is_searched);
+    if (has_shapes(plain) && !has_shapes(found)) {
+      plain = without(*refuted_, [&](const ModelTerm& term) { return is_searched(term) || term.generic; });
+    }
+    if (plain.found.empty() || has_shapes(plain)) continue;
     const double ratio = left_on_held_out(plain, found) / left_on_held_out(found, found);
     const bool holds = std::ranges::all_of(plain.found, &FoundTerm::confirmed);
     const bool has_fewer = fitted_numbers(plain) < fitted_numbers(found);
