@@ -147,6 +147,24 @@ TEST(LawTerms, CoulombAndViscousFrictionAreTwoTerms) {
   }
 }
 
+// Their code has no other values of c: below zero they would be an offset and dry friction under a wrong name.
+TEST(LawTerms, NoLimitAndNoDeadBandEndsBelowZero) {
+  const Inputs inputs{{"v"}, Eigen::VectorXd::LinSpaced(41, -2.0, 2.0)};
+  const Rows rows{.inputs = inputs.values, .simulated = Eigen::VectorXd::Zero(41), .sequence = {}, .instants = {}};
+  for (const ModelTerm& term : standard_terms(inputs)) {
+    if (term.family != "limit" && term.family != "dead_band") continue;
+    const auto column = [&](double c) -> Eigen::ArrayXd {
+      return term.columns(rows, Eigen::VectorXd::Constant(1, c)).col(0);
+    };
+    EXPECT_FALSE(column(-0.3).allFinite()) << term.family;
+    for (Eigen::Index i = 0; i < 41; ++i) {
+      const double v = inputs.values(i);
+      const double limited = std::clamp(v, -0.3, 0.3);
+      EXPECT_DOUBLE_EQ(column(0.3)(i), term.family == "limit" ? limited : v - limited) << term.family << " " << v;
+    }
+  }
+}
+
 TEST(LawTerms, AnglesAreKnownByTheirNamesAndRanges) {
   const auto has_harmonics = [](const std::string& name, double range) {
     const Inputs inputs{{name}, Eigen::VectorXd::LinSpaced(50, -0.5 * range, 0.5 * range)};

@@ -72,8 +72,8 @@ using OutputDerivatives =
     std::function<std::vector<Eigen::MatrixXd>(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values)>;
 
 /// Central differences of the simulation's outputs, with a hundredth of each parameter's scale to both sides: two calls
-/// for each parameter. Larger steps than rounding asks for, because outputs may be written with six digits. Keeps the
-/// simulation.
+/// for each parameter. Larger steps than rounding asks for, because outputs may be written with six digits. Holds a
+/// copy of the simulation.
 OutputDerivatives central_differences(Simulation simulation);
 
 /// find_missing() for a simulation that knows its derivatives, or that is worth few calls. It is linearised at the

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "discovery/terms/term_builders.hpp"
 
@@ -123,6 +124,10 @@ ModelTerm signed_power(const InputView& input) {
       [](const Eigen::ArrayXd& x, const Eigen::VectorXd& p) -> Eigen::ArrayXd { return x.sign() * x.abs().pow(p(0)); });
 }
 
+// Where a limit or a dead band ends. Below zero they would be other laws, an offset and dry friction: NaN turns a fit
+// back, as any column that is not finite.
+double end_at(double c) { return c >= 0.0 ? c : std::numeric_limits<double>::quiet_NaN(); }
+
 // What an actuator or a sensor that stops at +-c gives, and what one gives that begins beyond +-c.
 std::vector<ModelTerm> two_sided(const InputView& input) {
   const std::string& x = input.name;
@@ -131,12 +136,14 @@ std::vector<ModelTerm> two_sided(const InputView& input) {
   inner.width = true;
   return {law(input, "limit", fmt::format("max(-c, min(c, {}))", x), "slope", x, {inner}, "max(-($c), min($c, $1))",
               [](const Eigen::ArrayXd& v, const Eigen::VectorXd& c) -> Eigen::ArrayXd {
-                return v.min(std::abs(c(0))).max(-std::abs(c(0)));
+                const double end = end_at(c(0));
+                return v.unaryExpr([end](double at) { return std::isnan(end) ? end : std::clamp(at, -end, end); });
               }),
           law(input, "dead_band", fmt::format("sign({0}) max(0, |{0}| - c)", x), "slope", x,
               {smooth("c", x, geometric(0.02 * far, 0.9 * far, 24))}, "sign($1)*max(0, abs($1) - $c)",
               [](const Eigen::ArrayXd& v, const Eigen::VectorXd& c) -> Eigen::ArrayXd {
-                return v.sign() * (v.abs() - c(0)).max(0.0);
+                const double end = end_at(c(0));
+                return v.sign() * v.abs().unaryExpr([end](double size) { return size < end ? 0.0 : size - end; });
               })};
 }
 

@@ -82,8 +82,7 @@ std::vector<std::string> notes_on_reversals(const std::vector<Reversals>& revers
     notes.push_back(fmt::format(
         "at reversals of {0}, where |{0}| < {1:.3g}, the root mean square of the deviations is {2:.2g} times that at "
         "the faster half of the rows, and no term explains this: a filter has rounded dry friction, or the machine "
-        "sticks. "
-        "These {3} rows were set apart. The answer is about the other rows",
+        "sticks. These {3} rows were set apart. The answer is about the other rows",
         own.speed, own.limit, own.ratio, own.rows));
   }
   return notes;
