@@ -27,7 +27,8 @@ inline double tree_at(const llmt::BoostedTree& tree, const std::vector<double>& 
   if (std::isnan(value)) return tree_at(tree, z, split.missing_left ? split.left : split.right, share, blends);
   const double u = (value - split.threshold) / split.half_width;
   const double right = 0.5 + u * (3.0 - u * u) / 4.0;
-  if (std::abs(value - split.threshold) < split.half_width && share * right >= 0.08 && share * (1.0 - right) >= 0.08) {
+  if (std::abs(value - split.threshold) < split.half_width && share * right >= tree.smallest_share &&
+      share * (1.0 - right) >= tree.smallest_share) {
     ++blends;
     const double left_value = tree_at(tree, z, split.left, share * (1.0 - right), blends);
     return left_value + tree_at(tree, z, split.right, share * right, blends);

@@ -40,6 +40,7 @@ inline llmt::BoostedTree random_tree(const Kind& kind, int features, llmt::Rando
     open.push_back(&tree.splits.back().right);
   }
   for (std::size_t k = 0; k < open.size(); ++k) *open[k] = -1 - static_cast<int>(k);
+  if (random.uniform() < 0.5) tree.smallest_share = random.uniform() < 0.5 ? 0.0 : 0.2;
   for (int k = 0; k < kind.leaves; ++k) {
     llmt::BoostedLeaf leaf{.constant = random.normal(), .low = -kind.limit, .high = kind.limit};
     for (int feature = 0; feature < features; ++feature) {

@@ -60,11 +60,12 @@ std::string boosted_text(const BoostedRun& run, const BoostResult& result, std::
       text += wrapped(blend_text(result.model.outputs()[o].name, result.summaries[o]), width);
     }
   }
-  const bool is_of_all = std::ranges::all_of(result.summaries, is_blend);
+  const bool is_of_all = std::ranges::all_of(
+      result.summaries, [](const BoostSummary& summary) { return summary.held_out == summary.rows; });
   return text + wrapped(is_of_all
                             ? "The held-out error is of the whole fit, repeated without a fifth of the rows in turn.\n"
                             : "The held-out error is of trees fitted without those rows; they also decided when "
-                              "boosting stopped, so it is slightly too small.\n",
+                              "boosting stopped, and what is blended, so it is slightly too small.\n",
                         width);
 }
 

@@ -26,8 +26,10 @@ struct BoostedFeature {
   bool operator==(const BoostedFeature&) const = default;
 };
 
-/// A leaf's local model has at most this many slopes.
+/// A leaf's local model has at most this many slopes where boosting grew it, and
 inline constexpr int most_boosted_slopes = 8;
+/// this many in any tree. Contributions of inputs may take time that doubles with each.
+inline constexpr int most_leaf_slopes = 12;
 
 /// f = constant + sum of slopes . features, held to [low, high].
 struct BoostedLeaf {
@@ -39,7 +41,8 @@ struct BoostedLeaf {
 };
 
 /// z <= threshold of a feature goes to the left. With a half width h > 0 the rows with |z - threshold| < h go to both
-/// sides, to the right with the weight 1/2 + u (3 - u^2) / 4, u = (z - threshold) / h.
+/// sides, to the right with the weight 1/2 + u (3 - u^2) / 4, u = (z - threshold) / h, unless one side would get less
+/// of the row than BoostedTree::smallest_share: then the side on which it lies takes all.
 struct BoostedSplit {
   int feature = 0;
   double threshold = 0.0;
@@ -53,6 +56,7 @@ struct BoostedSplit {
 struct BoostedTree {
   std::vector<BoostedSplit> splits;
   std::vector<BoostedLeaf> leaves;
+  double smallest_share = 0.08;  ///< from 0 to 0.5, see BoostedSplit
 };
 
 /// The trees of one output: y = base + rate . sum of trees.

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "llmt/boosted_model.hpp"
@@ -30,6 +31,10 @@ struct BinnedFeature {
   double low = 0.0;  ///< smallest value
   double high = 0.0;
 
+  /// Of a row; NaN: missing.
+  double value(Eigen::Index row) const {
+    return cells[row] == missing_cell ? std::numeric_limits<double>::quiet_NaN() : values[row];
+  }
   int num_bins() const { return static_cast<int>(centres.size()); }
 };
 

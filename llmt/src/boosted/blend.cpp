@@ -5,10 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "boosted/linear_start.hpp"
+#include "boosted/one_tree.hpp"
 
 namespace llmt {
 namespace {
@@ -80,10 +82,10 @@ class BlendFit {
   }
 
  private:
-  std::vector<BoostedLeaf> start_of(const Variant& variant, const std::vector<int>& train) const {
-    return variant.has_start ? linear_start(data_.rows, output_, train) : std::vector<BoostedLeaf>();
+  std::vector<BoostedTree> start_of(const Variant& variant, const std::vector<int>& train) const {
+    return variant.has_start ? linear_start(data_.rows, output_, train) : std::vector<BoostedTree>();
   }
-  Eigen::VectorXd left_of(const std::vector<BoostedLeaf>& start) const {
+  Eigen::VectorXd left_of(const std::vector<BoostedTree>& start) const {
     return output_ - values_of(start, data_.rows);
   }
 
@@ -93,9 +95,23 @@ class BlendFit {
   std::vector<int> all_;
 };
 
+std::vector<int> all_of(Eigen::Index count) {
+  std::vector<int> all(count);
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
 double rmse_of(const Eigen::VectorXd& residuals, const Eigen::VectorXd& weights) {
   return std::sqrt(residuals.cwiseAbs2().dot(weights) / weights.sum());
 }
+
+double train_rmse_of(const std::vector<SumPart>& parts, const Eigen::VectorXd& weights) {
+  Eigen::VectorXd residuals = Eigen::VectorXd::Zero(weights.size());
+  for (const SumPart& part : parts) residuals += part.share * part.rounds.residuals;
+  return rmse_of(residuals, weights);
+}
+
+constexpr const char* name_of_tree = "one tree";
 
 }  // namespace
 
@@ -136,7 +152,7 @@ Blend blend(const BoostingData& data, const Eigen::VectorXd& output, const Round
   std::vector<Folds> folds;
   Eigen::MatrixXd residuals(output.size(), std::ssize(variants));
   Blend result;
-  Work searching(work, 0.8);
+  Work searching(work, 0.6);
   for (const Variant& variant : variants) {
     Work part(searching, searching.left() / static_cast<double>(variants.size() - folds.size()));
     folds.push_back(fit.in_folds(variant, part));
@@ -145,25 +161,60 @@ Blend blend(const BoostingData& data, const Eigen::VectorXd& output, const Round
       column(data.hold_outs[k].held_out) = folds.back().residuals(k);
     result.variants.push_back({.name = variant.name, .rmse = rmse_of(column, data.rows.weights)});
   }
+  Work growing(work, 0.25);
+  const std::optional<OneTree> tree = one_tree(data, output, usual.max_threads, growing);
+  if (tree) {
+    residuals.conservativeResize(Eigen::NoChange, residuals.cols() + 1);
+    residuals.rightCols(1) = tree->residuals;
+    result.variants.push_back({.name = name_of_tree, .rmse = rmse_of(tree->residuals, data.rows.weights)});
+  }
   result.residuals.resize(output.size());
   for (const HoldOut& rows : data.hold_outs) {  // with the shares that the other folds ask for
     const Eigen::VectorXd shares = shares_of(residuals, data.rows.weights, rows.train);
     result.residuals(rows.held_out) = residuals(rows.held_out, Eigen::all) * shares;
   }
-  std::vector<int> all(output.size());
-  std::iota(all.begin(), all.end(), 0);
-  const Eigen::VectorXd shares = shares_of(residuals, data.rows.weights, all);
-  Eigen::VectorXd left = Eigen::VectorXd::Zero(output.size());
-  for (std::size_t k = 0; k < variants.size(); ++k) {
-    result.variants[k].share = shares(static_cast<Eigen::Index>(k));
-    if (result.variants[k].share == 0.0) continue;
-    Work part(work, work.left() / static_cast<double>(variants.size() - k));
-    SumPart of_variant = fit.on_all(variants[k], folds[k].mean_rounds(no_fold), part);
-    of_variant.share = result.variants[k].share;
-    left += of_variant.share * of_variant.rounds.residuals;
-    result.parts.push_back(std::move(of_variant));
+  result.rmse = rmse_of(result.residuals, data.rows.weights);
+  const Eigen::VectorXd shares = shares_of(residuals, data.rows.weights, all_of(output.size()));
+  for (std::size_t k = 0; k < result.variants.size(); ++k) {
+    Work part(work, work.left() / static_cast<double>(result.variants.size() - k));
+    const double share = shares(static_cast<Eigen::Index>(k));
+    if (share == 0.0) continue;
+    result.variants[k].share = share;
+    result.parts.push_back(k < variants.size() ? fit.on_all(variants[k], folds[k].mean_rounds(no_fold), part)
+                                               : part_of(*tree, output, data.rows));
+    result.parts.back().share = share;
   }
-  result.train_rmse = rmse_of(left, data.rows.weights);
+  result.train_rmse = train_rmse_of(result.parts, data.rows.weights);
+  return result;
+}
+
+Blend with_one_tree(const BoostingData& data, const Eigen::VectorXd& output, SumPart sum,
+                    const Eigen::VectorXd& residuals, int max_threads, Work& work) {
+  const HoldOut& rows = data.hold_outs.front();
+  const Eigen::VectorXd weights = data.rows.weights(rows.held_out);
+  Blend result{.parts = {}, .variants = {}, .residuals = residuals, .rmse = rmse_of(residuals, weights)};
+  result.variants.push_back({"symmetric", result.rmse, 1.0});
+  result.parts.push_back(std::move(sum));
+  result.train_rmse = train_rmse_of(result.parts, data.rows.weights);
+  Work trying(work, 0.2);
+  const auto of_tree = held_out_residuals(data, output, rows, max_threads, trying);
+  if (!of_tree) return result;
+  result.variants.push_back({name_of_tree, rmse_of(*of_tree, weights), 0.0});
+  Eigen::MatrixXd both(weights.size(), 2);
+  both << residuals, *of_tree;
+  const Eigen::VectorXd shares = shares_of(both, weights, all_of(weights.size()));
+  const Eigen::VectorXd of_mean = both * shares;
+  const double noise = 1.0 / std::sqrt(static_cast<double>(weights.size()));
+  if (rmse_of(of_mean, weights) >= (1.0 - noise) * result.rmse) return result;
+  Work growing(work, work.left());
+  const std::optional<OneTree> tree = one_tree(data, output, max_threads, growing);
+  if (!tree) return result;
+  result.residuals = of_mean;
+  result.rmse = rmse_of(of_mean, weights);
+  result.parts.push_back(part_of(*tree, output, data.rows));
+  for (Eigen::Index k = 0; k < 2; ++k) result.variants[k].share = result.parts[k].share = shares(k);
+  std::erase_if(result.parts, [](const SumPart& part) { return part.share == 0.0; });
+  result.train_rmse = train_rmse_of(result.parts, data.rows.weights);
   return result;
 }
 

@@ -1,5 +1,5 @@
 /// \file
-/// The sum of few rows: a weighted mean of several variants, whose shares folds decide.
+/// Weighted means of variants of a sum and of one tree, whose shares held-out rows decide.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,13 +19,20 @@ Eigen::VectorXd shares_of(const Eigen::MatrixXd& residuals, const Eigen::VectorX
 
 struct Blend {
   std::vector<SumPart> parts;          ///< fitted to all rows
-  std::vector<BoostVariant> variants;  ///< all, with their errors in folds
-  Eigen::VectorXd residuals;           ///< of every row, when it was held out: of the whole procedure
+  std::vector<BoostVariant> variants;  ///< all, with their errors on held-out rows
+  Eigen::VectorXd residuals;           ///< of the held-out rows: of the whole procedure
+  double rmse = 0.0;                   ///< of these
   double train_rmse = 0.0;
 };
 
-/// `output`: standardised. `usual`: symmetric trees, the first variant. `data.hold_outs` are folds of all rows.
+/// Few rows: the mean of four variants of a sum and one tree. `output`: standardised. `usual`: symmetric trees, the
+/// first variant. `data.hold_outs` are folds of all rows, so every row is held out.
 Blend blend(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, bool is_rate_given,
             Random& random, Work& work);
+
+/// More rows: the mean of the `sum` of all rows and one tree, if the mean of those of fewer rows is clearly better on
+/// the only set of held-out rows than the sum, whose residuals there are `residuals`. Else the sum.
+Blend with_one_tree(const BoostingData& data, const Eigen::VectorXd& output, SumPart sum,
+                    const Eigen::VectorXd& residuals, int max_threads, Work& work);
 
 }  // namespace llmt

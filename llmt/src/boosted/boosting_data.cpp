@@ -24,7 +24,7 @@ constexpr double largest_extent = 1e100;  // sums of two standardised inputs sta
 
 // Below this number of rows one hold-out decides by chance: five of them decide together.
 constexpr Eigen::Index few_rows = 500;
-constexpr Eigen::Index parts = 5;
+constexpr Eigen::Index num_parts = 5;
 
 void check_options(const BoostOptions& options) {
   if (!(options.rate >= 0.0 && options.rate <= 1.0)) {
@@ -101,20 +101,26 @@ std::vector<int> units_of(const GivenRows& given, const std::vector<Eigen::Index
   return equal.group.empty() ? units : equal.group;
 }
 
-std::vector<HoldOut> deal(const std::vector<int>& units, std::uint64_t seed) {
-  const Eigen::Index rows = std::ssize(units);
+// The part of each row; rows of one unit are in one part.
+std::vector<int> deal(const std::vector<int>& units, std::uint64_t seed) {
   const Eigen::Index count = *std::ranges::max_element(units) + 1;
-  if (count < parts) {
+  if (count < num_parts) {
     throw std::invalid_argument(
-        fmt::format("llmt::fit_boosted: there are {} groups of rows, at least {} are needed", count, parts));
+        fmt::format("llmt::fit_boosted: there are {} groups of rows, at least {} are needed", count, num_parts));
   }
   const std::vector<Eigen::Index> order = Random(seed).permutation(count);
-  std::vector<Eigen::Index> part(count);
-  for (Eigen::Index k = 0; k < count; ++k) part[order[k]] = k % parts;
-  std::vector<HoldOut> result(rows < few_rows ? parts : 1);
-  for (Eigen::Index k = 0; k < std::ssize(result); ++k) {
-    for (Eigen::Index row = 0; row < rows; ++row) {
-      (part[units[row]] == k ? result[k].held_out : result[k].train).push_back(static_cast<int>(row));
+  std::vector<int> part(count);
+  for (Eigen::Index k = 0; k < count; ++k) part[order[k]] = static_cast<int>(k % num_parts);
+  std::vector<int> result;
+  for (const int unit : units) result.push_back(part[unit]);
+  return result;
+}
+
+std::vector<HoldOut> hold_outs_of(const std::vector<int>& part) {
+  std::vector<HoldOut> result(std::ssize(part) < few_rows ? num_parts : 1);
+  for (int k = 0; k < std::ssize(result); ++k) {
+    for (int row = 0; row < std::ssize(part); ++row) {
+      (part[row] == k ? result[k].held_out : result[k].train).push_back(row);
     }
   }
   return result;
@@ -236,8 +242,9 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
     return result;
   }
   result.is_hold_out_given = !given.held_out.empty();
+  if (!result.is_hold_out_given) result.parts = deal(units_of(given, different.first), options.seed);
   result.hold_outs = result.is_hold_out_given ? std::vector<HoldOut>{given_hold_out(given, different.first)}
-                                              : deal(units_of(given, different.first), options.seed);
+                                              : hold_outs_of(result.parts);
   describe_columns(data, given, result);
   for (int j = 0; j < std::ssize(result.inputs); ++j) {
     const int levels = static_cast<int>(result.inputs[j].levels.size());

@@ -23,6 +23,7 @@ struct BoostingData {
   BinnedRows rows;                 ///< with a feature for each numeric input and each level
   Eigen::MatrixXd y;               ///< outputs of the rows
   std::vector<HoldOut> hold_outs;  ///< empty: too few rows, whose mean is the model
+  std::vector<int> parts;  ///< of each row, 0 ... 4; the set k of hold_outs is the part k. Empty: given, or none
   bool is_hold_out_given = false;  ///< TrainingData::held_out: these rows are not fitted to
   Eigen::MatrixXd x;               ///< inputs of the rows
 };

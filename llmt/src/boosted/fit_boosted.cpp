@@ -195,7 +195,7 @@ class OutputFit {
   std::vector<SumPart> finish(BoostSummary& summary, Work& work) {
     const HoldOut& rows = data_.hold_outs.front();
     SumPart sum{.rate = rounds_.rate, .rounds = {}};
-    Work stopping(work, (data_.is_hold_out_given ? 1.0 : 0.5) * work.left());
+    Work stopping(work, (data_.is_hold_out_given ? 1.0 : 0.4) * work.left());
     sum.rounds = boost(data_.rows, y_, rows.train, rows.held_out, {}, rounds_, random_, stopping);
     summary.rmse = sum.rounds.rmse * scale_;
     summary.held_out = std::ssize(rows.held_out);
@@ -209,25 +209,33 @@ class OutputFit {
       more.most_rounds = static_cast<int>(std::ceil(more_trees * static_cast<double>(sum.rounds.trees.size())));
       const bool keep = rounds_.tree.symmetric && y_.size() >= enough_for_races;
       const std::vector<GrowingTree> kept = keep ? sum.rounds.trees : std::vector<GrowingTree>();
-      Work part(work, work.left());
+      Work part(work, (y_.size() < enough_for_races ? 0.7 : 1.0) * work.left());
       sum.rounds = boost(data_.rows, y_, all, {}, kept, more, random_, part);
     }
     summary.variant = name_;
     for (BoostVariant& variant : summary.compared) variant.share = variant.name == name_ ? 1.0 : 0.0;
     summary.train_rmse = sum.rounds.train_rmse * scale_;
-    return {sum};
+    if (data_.is_hold_out_given || y_.size() >= enough_for_races) return {sum};
+    Work part(work, work.left());
+    return take(with_one_tree(data_, y_, std::move(sum), residuals_, options_.max_threads, part), summary);
   }
 
   // Few rows: every fold is held out in turn.
   std::vector<SumPart> finish_few(BoostSummary& summary, Work& work) {
-    Blend mean = blend(data_, y_, rounds_, options_.rate > 0.0, random_, work);
-    residuals_ = mean.residuals;
-    summary.rmse = scale_ * std::sqrt(residuals_.cwiseAbs2().dot(data_.rows.weights) / data_.rows.weights.sum());
-    summary.train_rmse = scale_ * mean.train_rmse;
     summary.rows = summary.held_out = y_.size();
-    summary.variant = "blend";
+    return take(blend(data_, y_, rounds_, options_.rate > 0.0, random_, work), summary);
+  }
+
+  std::vector<SumPart> take(Blend mean, BoostSummary& summary) {
+    residuals_ = std::move(mean.residuals);
+    summary.rmse = scale_ * mean.rmse;
+    summary.train_rmse = scale_ * mean.train_rmse;
+    if (mean.parts.size() > 1) summary.variant = "blend";
     summary.compared = std::move(mean.variants);
-    for (BoostVariant& variant : summary.compared) variant.rmse *= scale_;
+    for (BoostVariant& variant : summary.compared) {
+      variant.rmse *= scale_;
+      if (variant.share == 1.0) summary.variant = variant.name;
+    }
     return std::move(mean.parts);
   }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "boosted/model/boosted_checks.hpp"
+
 namespace llmt {
 namespace {
 
@@ -52,34 +54,34 @@ Eigen::VectorXd ridge_slopes(const Eigen::MatrixXd& z, const Eigen::VectorXd& y,
 
 }  // namespace
 
-std::vector<BoostedLeaf> linear_start(const BinnedRows& rows, const Eigen::VectorXd& output,
+std::vector<BoostedTree> linear_start(const BinnedRows& rows, const Eigen::VectorXd& output,
                                       const std::vector<int>& train) {
   const Eigen::VectorXd weights = rows.weights(train);
   const auto centred = [&](const Eigen::VectorXd& values) -> Eigen::VectorXd {
     return values.array() - values.dot(weights) / weights.sum();
   };
   Eigen::MatrixXd z(std::ssize(train), std::ssize(rows.features));
-  std::vector<BoostedLeaf> leaves;
+  std::vector<BoostedTree> trees;
   for (Eigen::Index j = 0; j < z.cols(); ++j) z.col(j) = centred(column_of(rows.features[j])(train));
   const Eigen::VectorXd slopes = ridge_slopes(z, centred(output(train)), weights);
   for (Eigen::Index j = 0; j < z.cols(); ++j) {
     if (slopes(j) == 0.0) continue;
     const Eigen::VectorXd values = slopes(j) * column_of(rows.features[j])(train);
     const double margin = 0.1 * (values.maxCoeff() - values.minCoeff());
-    leaves.push_back({.constant = 0.0,
-                      .low = values.minCoeff() - margin,
-                      .high = values.maxCoeff() + margin,
-                      .features = {static_cast<int>(j)},
-                      .slopes = {slopes(j)}});
+    BoostedLeaf leaf{.constant = 0.0, .low = values.minCoeff() - margin, .high = values.maxCoeff() + margin};
+    leaf.features.push_back(static_cast<int>(j));
+    leaf.slopes.push_back(slopes(j));
+    trees.push_back({.splits = {}, .leaves = {leaf}});
   }
-  return leaves;
+  return trees;
 }
 
-Eigen::VectorXd values_of(const std::vector<BoostedLeaf>& slopes, const BinnedRows& rows) {
+Eigen::VectorXd values_of(const std::vector<BoostedTree>& trees, const BinnedRows& rows) {
   Eigen::VectorXd values = Eigen::VectorXd::Zero(rows.weights.size());
-  for (const BoostedLeaf& leaf : slopes) {
-    const Eigen::ArrayXd of_leaf = leaf.slopes.front() * column_of(rows.features[leaf.features.front()]).array();
-    values.array() += of_leaf.max(leaf.low).min(leaf.high);
+  std::vector<double> z(rows.features.size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    for (std::size_t j = 0; j < z.size(); ++j) z[j] = rows.features[j].value(i);
+    for (const BoostedTree& tree : trees) values(i) += value_of(tree, z.data());
   }
   return values;
 }

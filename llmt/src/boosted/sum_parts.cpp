@@ -25,7 +25,7 @@ BoostedSum sum_of(const std::vector<SumPart>& members, const BinnedRows& rows, d
       multiply(tree, scale * (part.share * rate / sum.rate));
       sum.trees.push_back(std::move(tree));
     };
-    for (const BoostedLeaf& leaf : part.start) add({.splits = {}, .leaves = {leaf}}, 1.0);
+    for (const BoostedTree& tree : part.start) add(tree, 1.0);
     for (const GrowingTree& tree : part.rounds.trees) add(finished(tree, rows), part.rate);
   }
   return sum;

@@ -8,12 +8,12 @@
 
 namespace llmt {
 
-/// Rounds that are a part of a sum, with the linear terms that they started from.
+/// Rounds that are a part of a sum, with the trees whose residuals they started from.
 struct SumPart {
   double share = 1.0;
   double rate = 1.0;
   Rounds rounds;
-  std::vector<BoostedLeaf> start = {};
+  std::vector<BoostedTree> start = {};
 };
 
 /// mean + scale . sum of share . (base + start + rate . trees), the shares adding up to 1. Its rate is the first

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <vector>
 
-#include "boosted/model/transition.hpp"
 #include "c_source/c_text.hpp"
 #include "llmt/c_source.hpp"
 
@@ -35,6 +34,11 @@ struct @_leaf {
 struct @_term {
   int feature;
   double slope;
+};
+
+struct @_root {
+  int at; /* a split, or -1 - k for leaf k */
+  double smallest; /* part of a row on one side of a split */
 };
 
 struct @_output {
@@ -69,12 +73,13 @@ static double @_leaf_at(const struct @_leaf *leaf, const double *z) {
 }
 
 /* The sides of a soft split are summed in the order of the library: all below the left one first. */
-static double @_tree(int at, const double *z) {
+static double @_tree(const struct @_root *root, const double *z) {
   int waiting[@_DEPTH + 1] = {0};
   double shares[@_DEPTH + 1] = {0.0};
   double sums[@_DEPTH + 1] = {0.0};
   double share = 1.0;
   double sum = 0.0;
+  int at = root->at;
   int count = 0;
   for (;;) {
     while (at >= 0) {
@@ -88,7 +93,7 @@ static double @_tree(int at, const double *z) {
       if ((beyond < 0.0 ? -beyond : beyond) < s->half_width) {
         const double u = beyond / s->half_width;
         const double right = 0.5 + u * (3.0 - u * u) / 4.0;
-        if (share * right >= @_SMALLEST && share * (1.0 - right) >= @_SMALLEST) {
+        if (share * (right < 1.0 - right ? right : 1.0 - right) >= root->smallest) {
           waiting[count] = s->right;
           shares[count] = share * right;
           sums[count++] = sum;
@@ -119,7 +124,7 @@ int @_predict(const double *inputs, double *outputs) {
   for (i = 0; i < @_OUTPUTS; ++i) {
     const struct @_output *output = @_outputs + i;
     double sum = 0.0;
-    for (k = output->first_tree; k < output->first_tree + output->trees; ++k) sum += @_tree(@_roots[k], z);
+    for (k = output->first_tree; k < output->first_tree + output->trees; ++k) sum += @_tree(@_roots + k, z);
     outputs[i] = output->base + output->rate * sum;
   }
   return 0;
@@ -146,7 +151,7 @@ struct Entries {
   std::vector<std::string> leaves;
   std::vector<std::string> terms;
   std::vector<std::string> outputs;
-  std::vector<int> roots;
+  std::vector<std::string> roots;
   std::size_t depth = 0;
 
   void add_tree(const BoostedTree& tree, std::size_t first_feature) {
@@ -154,7 +159,8 @@ struct Entries {
       return k >= 0 ? static_cast<int>(first_split) + k : k - static_cast<int>(first_leaf);
     };
     depth = std::max(depth, depth_of(tree));
-    roots.push_back(child(tree.splits.empty() ? -1 : 0));
+    roots.push_back(
+        fmt::format("{{{}, {}}}", child(tree.splits.empty() ? -1 : 0), Tables::number(tree.smallest_share)));
     std::vector<std::string> of_tree;
     for (const BoostedSplit& split : tree.splits) {
       of_tree.push_back(fmt::format("{{{}, {}, {}, {}, {}, {}}}", first_feature + split.feature,
@@ -211,12 +217,10 @@ CSource to_c(const BoostedModel& model, const std::string& name, const std::stri
   add("leaves", "leaf", entries.leaves);
   add("terms", "term", entries.terms);
   add("outputs", "output", entries.outputs);
-  if (entries.roots.empty()) entries.roots.push_back(0);
-  tables.add("roots", entries.roots);
+  add("roots", "root", entries.roots);
   const std::string sizes =
-      fmt::format("enum {{ @_INPUTS = {}, @_OUTPUTS = {}, @_FEATURES = {}, @_DEPTH = {} }};\n#define @_SMALLEST {}\n",
-                  model.num_inputs(), model.num_outputs(), std::max<std::size_t>(entries.features.size(), 1),
-                  entries.depth, smallest_share);
+      fmt::format("enum {{ @_INPUTS = {}, @_OUTPUTS = {}, @_FEATURES = {}, @_DEPTH = {} }};\n", model.num_inputs(),
+                  model.num_outputs(), std::max<std::size_t>(entries.features.size(), 1), entries.depth);
   return c_source_of(head_comment("Sum of local linear model trees", model.inputs(), model.outputs(), name), name,
                      header_name, sizes + c_boosted_tables, tables, c_boosted_runtime);
 }

@@ -79,7 +79,7 @@ void TwoRows::walk(int at, double share) {
     const Way way = way_of(split, z);
     if (way == Way::both) {
       const double right = share_of_right(z, split.threshold, split.half_width);
-      if (goes_both_ways(share, right)) {
+      if (goes_both_ways(share, right, tree_->smallest_share)) {
         walk(split.left, share * (1.0 - right));
         share *= right;
         at = split.right;

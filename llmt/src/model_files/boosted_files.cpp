@@ -43,7 +43,9 @@ Json of_tree(const BoostedTree& tree) {
     }
     leaves.push_back(std::move(of_leaf));
   }
-  return {{"splits", std::move(splits)}, {"leaves", std::move(leaves)}};
+  Json json = {{"splits", std::move(splits)}, {"leaves", std::move(leaves)}};
+  if (tree.smallest_share != BoostedTree().smallest_share) json["smallest_share"] = tree.smallest_share;
+  return json;
 }
 
 InputColumn input_from(const JsonReader& json, double& deviation) {
@@ -104,6 +106,7 @@ BoostedSum sum_from(const JsonReader& json) {
     BoostedTree tree;
     for (const JsonReader& split : entry.member("splits").elements()) tree.splits.push_back(split_from(split));
     for (const JsonReader& leaf : entry.member("leaves").elements()) tree.leaves.push_back(leaf_from(leaf));
+    tree.smallest_share = entry.as("smallest_share", tree.smallest_share);
     sum.trees.push_back(std::move(tree));
   }
   if (json.has("residuals")) sum.residuals = json.member("residuals").list<double>();

@@ -66,8 +66,8 @@ void check_leaf(const BoostedLeaf& leaf, std::size_t features, const std::string
     fail(pointer, "low and high are no range");
   }
   if (leaf.features.size() != leaf.slopes.size()) fail(pointer, "not one slope a feature");
-  if (std::ssize(leaf.features) > most_boosted_slopes) {
-    fail(pointer, fmt::format("more than {} slopes", most_boosted_slopes));
+  if (std::ssize(leaf.features) > most_leaf_slopes) {
+    fail(pointer, fmt::format("more than {} slopes", most_leaf_slopes));
   }
   for (std::size_t k = 0; k < leaf.features.size(); ++k) {
     if (leaf.features[k] < 0 || std::cmp_greater_equal(leaf.features[k], features)) {
@@ -80,6 +80,9 @@ void check_leaf(const BoostedLeaf& leaf, std::size_t features, const std::string
 // Every split but the first and every leaf is below one split, which stands before it: so all of them are reached.
 void check_tree(const BoostedTree& tree, std::size_t features, const std::string& pointer) {
   if (tree.leaves.size() != tree.splits.size() + 1) fail(pointer, "a tree has one leaf more than splits");
+  if (!(tree.smallest_share >= 0.0 && tree.smallest_share <= 0.5)) {
+    fail(pointer, "smallest_share is not from 0 to 0.5");
+  }
   std::vector<bool> split_seen(tree.splits.size(), false);
   std::vector<bool> leaf_seen(tree.leaves.size(), false);
   for (std::size_t k = 0; k < tree.splits.size(); ++k) {

@@ -26,7 +26,7 @@ double value_below(const BoostedTree& tree, const double* z, int at, double shar
     }
     if (std::abs(value - split.threshold) < split.half_width) {
       const double right = share_of_right(value, split.threshold, split.half_width);
-      if (goes_both_ways(share, right)) {
+      if (goes_both_ways(share, right, tree.smallest_share)) {
         sum += value_below(tree, z, split.left, share * (1.0 - right));
         share *= right;
         at = split.right;

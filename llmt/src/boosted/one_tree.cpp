@@ -1,0 +1,165 @@
+#include "boosted/one_tree.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <vector>
+
+#include "boosted/linear_start.hpp"
+#include "boosted/model/boosted_checks.hpp"
+#include "llmt/fit.hpp"
+
+namespace llmt {
+namespace {
+
+// A sum has no split that sends several levels to one side, and no mean of a leaf for an empty cell.
+bool has_numbers_alone(const BoostingData& data) {
+  return !data.x.hasNaN() && std::ranges::none_of(data.inputs, &InputColumn::is_categorical);
+}
+
+bool is_sayable(const Model& model) {
+  const ValidityKind kind = model.partitions().front().validity.kind;
+  const bool has_products =
+      std::ranges::any_of(model.regressors(), [](const Regressor& regressor) { return regressor.second_input >= 0; });
+  return !has_products && (kind == ValidityKind::crisp || kind == ValidityKind::blend);
+}
+
+// A node's model in the features of a sum: input j is the feature j, z = (x - centre) / deviation.
+BoostedLeaf leaf_of(const Node& node, const std::vector<Regressor>& regressors, const BoostingData& data) {
+  BoostedLeaf leaf{.constant = node.value(0)};
+  for (Eigen::Index k = 0; k < node.slope.cols(); ++k) {
+    const double slope = node.slope(0, k);
+    if (slope == 0.0) continue;
+    const int input = regressors[k].input;
+    leaf.constant += slope * (data.inputs[input].centre - regressors[k].centre);
+    leaf.features.push_back(input);
+    leaf.slopes.push_back(slope * data.deviations[input]);
+  }
+  return leaf;
+}
+
+BoostedSplit split_of(const Node& node, const BoostingData& data) {
+  const double deviation = data.deviations[node.split_input];
+  return {.feature = node.split_input,
+          .threshold = (node.threshold - data.inputs[node.split_input].centre) / deviation,
+          .half_width = node.half_width / deviation,
+          .missing_left = node.missing_left >= 0.5};
+}
+
+double value_at(const BoostedLeaf& leaf, const BinnedRows& rows, int row) {
+  double value = leaf.constant;
+  for (std::size_t k = 0; k < leaf.features.size(); ++k) {
+    value += leaf.slopes[k] * rows.features[leaf.features[k]].value(row);
+  }
+  return value;
+}
+
+// `validities`: of the leaf in the rows `train`.
+void hold(BoostedLeaf& leaf, const Eigen::VectorXd& validities, const BinnedRows& rows, const std::vector<int>& train) {
+  leaf.low = std::numeric_limits<double>::infinity();
+  leaf.high = -leaf.low;
+  for (Eigen::Index i = 0; i < validities.size(); ++i) {
+    if (validities(i) <= 0.0) continue;
+    const double value = value_at(leaf, rows, train[i]);
+    leaf.low = std::min(leaf.low, value);
+    leaf.high = std::max(leaf.high, value);
+  }
+  if (leaf.low > leaf.high) leaf.low = leaf.high = leaf.constant;
+  const double margin = 0.1 * (leaf.high - leaf.low);
+  leaf.low -= margin;
+  leaf.high += margin;
+}
+
+// `train`: the rows that the model was fitted to.
+std::optional<BoostedTree> translated(const Model& model, const BoostingData& data, const std::vector<int>& train,
+                                      int max_threads) {
+  if (!is_sayable(model)) return std::nullopt;
+  const std::vector<Node>& nodes = model.partitions().front().nodes;
+  const Eigen::MatrixXd validities = model.validities(data.x(train, Eigen::all), 0, max_threads);
+  BoostedTree tree;
+  tree.smallest_share = 0.0;  // blends hand over smoothly down to nothing
+  std::vector<int> number(nodes.size(), 0);
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    if (nodes[k].is_leaf()) continue;
+    number[k] = static_cast<int>(tree.splits.size());
+    tree.splits.push_back(split_of(nodes[k], data));
+  }
+  for (const Leaf& leaf : model.leaves(0)) {
+    number[leaf.node] = -1 - static_cast<int>(tree.leaves.size());
+    tree.leaves.push_back(leaf_of(nodes[leaf.node], model.regressors(), data));
+    if (std::ssize(tree.leaves.back().slopes) > most_leaf_slopes) return std::nullopt;
+    hold(tree.leaves.back(), validities.col(std::ssize(tree.leaves) - 1), data.rows, train);
+  }
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    if (nodes[k].is_leaf()) continue;
+    tree.splits[number[k]].left = number[nodes[k].left];
+    tree.splits[number[k]].right = number[nodes[k].right];
+  }
+  return tree;
+}
+
+FitResult fit_to(const BoostingData& data, const Eigen::VectorXd& output, const HoldOut* chosen_by, int max_threads,
+                 Work& work) {
+  TrainingData rows;
+  rows.inputs = data.x;
+  rows.outputs = output;
+  rows.weights = data.rows.weights;
+  if (chosen_by != nullptr) {
+    rows.held_out.assign(chosen_by->held_out.begin(), chosen_by->held_out.end());
+  } else {
+    rows.groups.assign(data.parts.begin(), data.parts.end());
+  }
+  rows.may_have_codes = false;
+  FitOptions options;
+  options.max_threads = max_threads;
+  return fit(rows, options, work.progress());
+}
+
+// The residuals of the rows that the model was not fitted to.
+std::optional<Eigen::VectorXd> residuals_of(const Model& model, const BoostingData& data, const Eigen::VectorXd& output,
+                                            const HoldOut& rows, int max_threads) {
+  const std::optional<BoostedTree> tree = translated(model, data, rows.train, max_threads);
+  if (!tree) return std::nullopt;
+  return (output - values_of({*tree}, data.rows))(rows.held_out);
+}
+
+HoldOut part_apart(const std::vector<int>& parts, int part) {
+  HoldOut rows;
+  for (int row = 0; row < std::ssize(parts); ++row) {
+    (parts[row] == part ? rows.held_out : rows.train).push_back(row);
+  }
+  return rows;
+}
+
+}  // namespace
+
+std::optional<OneTree> one_tree(const BoostingData& data, const Eigen::VectorXd& output, int max_threads, Work& work) {
+  if (!has_numbers_alone(data)) return std::nullopt;
+  const FitResult fitted = fit_to(data, output, nullptr, max_threads, work);
+  std::vector<int> all(output.size());
+  std::iota(all.begin(), all.end(), 0);
+  const std::optional<BoostedTree> tree = translated(fitted.model, data, all, max_threads);
+  if (!tree) return std::nullopt;
+  OneTree result{.tree = *tree, .residuals = output};
+  for (std::size_t fold = 0; fold < fitted.intervals.models().size(); ++fold) {
+    const HoldOut rows = part_apart(data.parts, data.parts[fitted.summary.held_out[fold].front()]);
+    const auto residuals = residuals_of(fitted.intervals.models()[fold], data, output, rows, max_threads);
+    if (!residuals) return std::nullopt;
+    result.residuals(rows.held_out) = *residuals;
+  }
+  return result;
+}
+
+std::optional<Eigen::VectorXd> held_out_residuals(const BoostingData& data, const Eigen::VectorXd& output,
+                                                  const HoldOut& rows, int max_threads, Work& work) {
+  if (!has_numbers_alone(data)) return std::nullopt;
+  return residuals_of(fit_to(data, output, &rows, max_threads, work).model, data, output, rows, max_threads);
+}
+
+SumPart part_of(const OneTree& one, const Eigen::VectorXd& output, const BinnedRows& rows) {
+  SumPart part{.rounds = {}, .start = {one.tree}};
+  part.rounds.residuals = output - values_of(part.start, rows);
+  return part;
+}
+
+}  // namespace llmt
