@@ -65,14 +65,14 @@ def lightgbm_sequence(table: Path, rows: int, asked: np.ndarray, rounds: int, th
 
         def __getitem__(self, index: int | slice | list[int]) -> np.ndarray:
             columns = self.reader.get_batch(self.number).columns[:-1]
-            return np.column_stack([column.to_numpy()[index] for column in columns])
+            return np.stack([column.to_numpy()[index] for column in columns], axis=-1)  # one row: no matrix
 
     with pa.memory_map(str(table)) as source, pa.ipc.open_file(source) as reader:
         y = np.concatenate(
             [reader.get_batch(k).columns[-1] for k in range(reader.num_record_batches)], dtype=np.float32
         )
         batches = [Batches(reader, number) for number in range(reader.num_record_batches)]
-        options = {"objective": "regression", "num_threads": threads, "verbose": -1}
+        options = {"objective": "regression", "num_threads": threads, "verbose": -1, "force_col_wise": True}  # one copy
         return lightgbm.train(options, lightgbm.Dataset(batches, y), rounds).predict(asked)
 
 
