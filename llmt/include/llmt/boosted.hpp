@@ -34,10 +34,10 @@ struct BoostOptions {
   bool mean_of_few = false;  ///< of fewer than `fewest_boosted_rows` different rows: their mean, in place of an error
 };
 
-/// A variant of the trees that was compared on held-out rows: after the same few rounds as the others, or, below 500
+/// A variant of the trees that was compared on held-out rows: after the same few rounds as the others, or, below 5000
 /// rows, when all trees are there.
 struct BoostVariant {
-  std::string name;  ///< "symmetric", "free", "symmetric with pairs", ...
+  std::string name;  ///< "symmetric", "free", "symmetric with pairs", "one tree", ...
   double rmse = 0.0;
   double share = 0.0;  ///< of the sum
 };
@@ -48,7 +48,7 @@ struct BoostSummary {
   Eigen::Index held_out = 0;           ///< rows that decided the variant and the number of trees
   double rmse = 0.0;                   ///< on these, of the trees fitted without them, in the output's unit; or NaN
   std::string variant;                 ///< the one taken; "blend": a mean; "mean": see BoostOptions::mean_of_few
-  std::vector<BoostVariant> compared;  ///< empty from 500 to 5000 rows: symmetric trees
+  std::vector<BoostVariant> compared;  ///< empty: symmetric trees, without a choice
   Eigen::Index trees = 0;
   double train_rmse = 0.0;
 };
@@ -63,8 +63,8 @@ struct BoostResult {
 /// A fifth of the rows is held out, whole groups of them. They decide which trees are taken and when boosting stops.
 /// Then the sum is fitted to all rows with a quarter more trees. With TrainingData::held_out these rows decide instead,
 /// and the sum of the other rows is the result. Below 500 rows each fifth is held out in turn, and the sum is a
-/// weighted mean of four variants; its error is that of the whole procedure, shares and number of trees chosen without
-/// the row.
+/// weighted mean of four variants and one tree, as fit() makes it; its error is that of the whole procedure, shares and
+/// number of trees chosen without the row. Below 5000 rows such a tree takes part if it is better by itself.
 ///
 /// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
 ///

@@ -30,8 +30,8 @@ struct Blend {
 Blend blend(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, bool is_rate_given,
             Random& random, Work& work);
 
-/// More rows: the mean of the `sum` of all rows and one tree, if the mean of those of fewer rows is clearly better on
-/// the only set of held-out rows than the sum, whose residuals there are `residuals`. Else the sum.
+/// More rows: the mean of the `sum` of all rows and one tree, if one tree of fewer rows is better than the sum of these
+/// by more than 1 / sqrt(m) of the error on the m held-out rows. There the sum leaves `residuals`. Else the sum alone.
 Blend with_one_tree(const BoostingData& data, const Eigen::VectorXd& output, SumPart sum,
                     const Eigen::VectorXd& residuals, int max_threads, Work& work);
 
