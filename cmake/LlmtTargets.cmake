@@ -11,6 +11,11 @@ function(llmt_target_defaults target)
       $<$<CXX_COMPILER_ID:GNU,Clang,AppleClang>:-ffp-contract=off>
       $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU,Clang,AppleClang>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion>>
   )
+  # GCC collects garbage each time its heap has doubled, which takes a twentieth of the time of large sources; here when it is
+  # fivefold. That takes up to a quarter more memory.
+  if(LLMT_UNITY_BUILD)
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-expand=400>)
+  endif()
   # Without it Eigen asks the processor for the sizes of its caches and cuts products of matrices by them: the sums of a
   # product would round differently with a first cache of 48 KiB than with one of 32.
   target_compile_definitions(${target} PRIVATE EIGEN_NO_CPUID)

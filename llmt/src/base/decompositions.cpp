@@ -1,0 +1,2 @@
+#define LLMT_DECOMPOSITION template
+#include "base/decompositions.hpp"
