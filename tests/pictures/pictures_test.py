@@ -29,7 +29,7 @@ class Pictures(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_an_arrow_less_in_the_table_of_rooms_is_noticed(self):
-        self.assertIn("is not what the tables make", self.changed(r"^(  compare  .*) fit (\|.*)$", r"\1 \2").stderr)
+        self.assertIn("is not what the tables make", self.changed(r"^(  boosted  .*) fit (\|.*)$", r"\1 \2").stderr)
 
     def test_another_order_of_stages_is_noticed(self):
         self.assertIn("is not what the tables make", self.changed(r"^(\| grow \|.*\n)(\| choose \|.*\n)", r"\2\1").stderr)

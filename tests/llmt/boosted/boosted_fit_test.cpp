@@ -276,6 +276,16 @@ TEST(BoostedFile, ReadsBackExactly) {
   EXPECT_EQ(again.inputs()[5].levels, data.levels[5]);
 }
 
+TEST(BoostedFile, KeepsTheSmallestShareOfOneTree) {
+  const llmt::TrainingData data = friedman(200, 4);
+  const llmt::BoostedModel model = llmt::fit_boosted(data, {.max_rounds = 8}).model;
+  const auto has_no_smallest = [](const llmt::BoostedTree& tree) { return tree.smallest_share == 0.0; };
+  ASSERT_EQ(std::ranges::count_if(model.sums()[0].trees, has_no_smallest), 1);
+  const llmt::BoostedModel again = llmt::boosted_from_json(to_json(model));
+  EXPECT_EQ(std::ranges::count_if(again.sums()[0].trees, has_no_smallest), 1);
+  EXPECT_EQ(again.predict(data.inputs), model.predict(data.inputs));
+}
+
 void expect_fault(const std::string& text, const std::string& words) {
   try {
     llmt::boosted_from_json(text, "file");
@@ -306,6 +316,10 @@ TEST(BoostedFile, SaysWhereItIsWrong) {
   expect_fault(changed("/sums/0/trees/0/splits/0/4", -2000000000), "is no child");
   expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 2.0}), "/sums/0/trees/0/leaves/0: a leaf has 3 numbers");
   expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 3.0, 2.0}), "low and high are no range");
+  expect_fault(changed("/sums/0/trees/0/smallest_share", 0.6), "smallest_share is not from 0 to 0.5");
+  Json steep = {1.0, 0.0, 2.0};
+  for (int slope = 0; slope <= llmt::most_leaf_slopes; ++slope) steep.insert(steep.end(), {0, 1.0});
+  expect_fault(changed("/sums/0/trees/0/leaves/0", steep), "more than 12 slopes");
   expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 1.0, 2.0, -1, 1.0}), "there is no feature -1");
   expect_fault(changed("/sums/0/residuals/2", -1.0), "/sums/0/residuals/2: residuals are not finite");
   expect_fault(changed("/sums/1", Json::object()), "/sums/1");
