@@ -10,6 +10,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "llmt/boosted.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/readable.hpp"
 #include "llmt/size.hpp"
@@ -30,6 +31,7 @@ constexpr std::size_t most_training_rows = 10000;
 
 const std::string llmt_name = "llmt";
 const std::string readable_name = "llmt readable";
+const std::string sum_name = "llmt (boost)";
 
 struct Arguments {
   std::string folder;
@@ -37,6 +39,7 @@ struct Arguments {
   int seeds = 5;
   int threads = 1;
   bool readable = false;
+  bool boost = false;
 };
 
 // A table as it is in the file, the output last.
@@ -86,7 +89,38 @@ std::size_t inputs_used(const llmt::Model& model) {
   return used.size();
 }
 
-double test_r2(const llmt::Model& model, const Trial& trial) {
+// Inputs in splits and slopes of the trees.
+std::size_t inputs_used(const llmt::BoostedSum& sum) {
+  std::set<int> used;
+  const auto use = [&](int feature) {
+    used.insert(sum.features[feature].first);
+    if (sum.features[feature].second >= 0) used.insert(sum.features[feature].second);
+  };
+  for (const llmt::BoostedTree& tree : sum.trees) {
+    for (const llmt::BoostedSplit& split : tree.splits) use(split.feature);
+    for (const llmt::BoostedLeaf& leaf : tree.leaves) std::ranges::for_each(leaf.features, use);
+  }
+  return used.size();
+}
+
+std::size_t leaves_of(const llmt::BoostedSum& sum) {
+  std::size_t leaves = 0;
+  for (const llmt::BoostedTree& tree : sum.trees) leaves += tree.leaves.size();
+  return leaves;
+}
+
+// As if nothing were soft or held: a split is "if x <= t", a slope "+ b x", a leaf a constant, a tree one sum more.
+std::size_t expression_size(const llmt::BoostedSum& sum) {
+  std::size_t size = 1;
+  for (const llmt::BoostedTree& tree : sum.trees) {
+    size += 1 + 4 * tree.splits.size() + tree.leaves.size();
+    for (const llmt::BoostedLeaf& leaf : tree.leaves) size += 4 * leaf.slopes.size();
+  }
+  return size;
+}
+
+template <class AnyModel>
+double test_r2(const AnyModel& model, const Trial& trial) {
   const Eigen::VectorXd error = trial.test_output - model.predict(trial.test_inputs);
   return 1.0 - error.squaredNorm() / (trial.test_output.array() - trial.test_output.mean()).matrix().squaredNorm();
 }
@@ -113,11 +147,21 @@ struct Trials {
     inputs.push_back(static_cast<double>(inputs_used(model)));
     seconds.push_back(fit_seconds);
   }
+
+  void add(const llmt::BoostedModel& model, const Trial& trial, double fit_seconds) {
+    const llmt::BoostedSum& sum = model.sums().front();
+    r2.push_back(test_r2(model, trial));
+    size.push_back(static_cast<double>(expression_size(sum)));
+    leaves.push_back(static_cast<double>(leaves_of(sum)));
+    inputs.push_back(static_cast<double>(inputs_used(sum)));
+    seconds.push_back(fit_seconds);
+  }
 };
 
 struct Runs {
   Trials llmt;
   Trials readable;
+  Trials sum;
   Trials least_squares;
 };
 
@@ -138,6 +182,13 @@ Runs run(const Data& data, const Arguments& arguments) {
       std::optional<llmt::ReadableResult> readable;
       cost = measure([&] { readable = llmt::fit_readable(*prepared, fit->summary); });
       runs.readable.add(readable->model, trial, cost.cpu);
+    }
+    if (arguments.boost) {
+      std::optional<llmt::BoostResult> sum;
+      cost = measure([&] {
+        sum = llmt::fit_boosted({trial.train_inputs, trial.train_output}, {.max_threads = arguments.threads});
+      });
+      runs.sum.add(sum->model, trial, cost.cpu);
     }
     fit = llmt::fit(trial.train_inputs, trial.train_output, least_squares(options));
     runs.least_squares.add(fit->model, trial, 0.0);
@@ -168,6 +219,10 @@ void print_lines(const ScoredTable& table, const Runs& runs) {
     fmt::print("{:65} |", "  readable");
     print_trials(table, readable_name, runs.readable);
   }
+  if (table.ours.contains(sum_name)) {
+    fmt::print("{:65} |", "  sum of trees");
+    print_trials(table, sum_name, runs.sum);
+  }
   std::fflush(stdout);
 }
 
@@ -186,6 +241,7 @@ void study_srbench(const Arguments& arguments) {
     const Runs runs = run(data, arguments);
     Scores ours = {{llmt_name, score_of(runs.llmt)}};
     if (arguments.readable) ours[readable_name] = score_of(runs.readable);
+    if (arguments.boost) ours[sum_name] = score_of(runs.sum);
     tables.push_back({name, data.inputs.rows(), data.inputs.cols(), ours, published.at(name)});
     print_lines(tables.back(), runs);
     seconds += sum(runs.llmt.seconds);
@@ -215,6 +271,7 @@ void add_srbench(CLI::App& study) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("--readable", arguments->readable, "also the readable model of each fit, ranked in its place");
+  command->add_flag("--boost", arguments->boost, "also a sum of trees, ranked in its place");
   command->callback([arguments] { study_srbench(*arguments); });
 }
 
