@@ -64,7 +64,8 @@ struct BoostResult {
 /// Then the sum is fitted to all rows with a quarter more trees. With TrainingData::held_out these rows decide instead,
 /// and the sum of the other rows is the result. Below 500 rows each fifth is held out in turn, and the sum is a
 /// weighted mean of four variants and one tree, as fit() makes it; its error is that of the whole procedure, shares and
-/// number of trees chosen without the row. Below 5000 rows such a tree takes part if it is better by itself.
+/// number of trees chosen without the row. From 500 to 5000 rows it is the mean of the sum and such a tree where the
+/// tree alone is clearly better than the sum on the held-out rows.
 ///
 /// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
 ///

@@ -26,9 +26,9 @@ struct BoostedFeature {
   bool operator==(const BoostedFeature&) const = default;
 };
 
-/// A leaf's local model has at most this many slopes where boosting grew it, and
+/// The largest number of slopes in a leaf of a tree that boosting grew.
 inline constexpr int most_boosted_slopes = 8;
-/// this many in any tree. Contributions of inputs may take time that doubles with each.
+/// The largest number of slopes in a leaf of any tree. The time of contributions of inputs may double with each.
 inline constexpr int most_leaf_slopes = 12;
 
 /// f = constant + sum of slopes . features, held to [low, high].

@@ -20,7 +20,7 @@ Eigen::VectorXd shares_of(const Eigen::MatrixXd& residuals, const Eigen::VectorX
 struct Blend {
   std::vector<SumPart> parts;          ///< fitted to all rows
   std::vector<BoostVariant> variants;  ///< all, with their errors on held-out rows
-  Eigen::VectorXd residuals;           ///< of the held-out rows: of the whole procedure
+  Eigen::VectorXd residuals;           ///< of the held-out rows, of trees fitted without them
   double rmse = 0.0;                   ///< of these
   double train_rmse = 0.0;
 };
