@@ -1,7 +1,7 @@
 /// \file
 /// What this machine can do at most, for figures such as "fraction of peak". Every measurement takes about 0.3 s.
 ///
-/// With GCC on x86 each kernel is compiled for several instruction sets and the loader takes the widest, as in the
+/// With GCC on x86 each kernel is compiled for several instruction sets and the widest one is taken, as in the
 /// library's own kernels.
 #pragma once
 
@@ -13,79 +13,102 @@
 #include <thread>
 #include <vector>
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define BENCH_FOR_EACH_INSTRUCTION_SET __attribute__((target_clones("avx512f", "arch=haswell", "default")))
-#define BENCH_HAS_FMA (__builtin_cpu_supports("fma") != 0)
-#else
-#define BENCH_FOR_EACH_INSTRUCTION_SET
-#define BENCH_HAS_FMA false
-#endif
+#include "base/simd.hpp"
 
 namespace bench::peak {
 
-typedef double Lanes __attribute__((vector_size(64), aligned(8)));  // NOLINT(modernize-use-using): clang
-inline constexpr Eigen::Index lanes = 8;
+using llmt::Eight;
+using llmt::lanes;
 
 struct Product {
-  [[gnu::always_inline]] static void update(Lanes& x, const Lanes& a, const Lanes& b) { x = x * a + b; }
+  template <int bytes>
+  LLMT_INLINE static void update(Eight<bytes>& x, const Eight<bytes>& a, const Eight<bytes>& b) {
+    x = x * a;
+    x += b;
+  }
 };
 
 struct FusedProduct {
-  [[gnu::always_inline]] static void update(Lanes& x, const Lanes& a, const Lanes& b) {
-    for (Eigen::Index l = 0; l < lanes; ++l) {
-      x[l] = __builtin_fma(x[l], a[l], b[l]);
+  template <int bytes>
+  LLMT_INLINE static void update(Eight<bytes>& x, const Eight<bytes>& a, const Eight<bytes>& b) {
+    for (int part = 0; part < Eight<bytes>::count; ++part) {
+      for (int k = 0; k < bytes / 8; ++k) {
+        x.parts[part][k] = __builtin_fma(x.parts[part][k], a.parts[part][k], b.parts[part][k]);
+      }
     }
   }
 };
 
+template <int bytes>
+LLMT_INLINE Eight<bytes> eight_times(double value) {
+  Eight<bytes> result;
+  for (auto& part : result.parts) part = value - typename Eight<bytes>::Register{};
+  return result;
+}
+
 /// `Chains` sequences x <- x a + b side by side. Which number of chains hides the latency without running out of
 /// registers depends on the machine, so callers try several.
-template <class Update, int Chains>
-[[gnu::always_inline]] inline double chains(Eigen::Index steps, double factor, double term) {
-  const Lanes a = factor - Lanes{};
-  const Lanes b = term - Lanes{};
-  Lanes x[Chains];
-  for (int c = 0; c < Chains; ++c) {
-    x[c] = a + static_cast<double>(c);
-  }
+template <class Update, int Chains, int bytes>
+LLMT_INLINE double chains(Eigen::Index steps, double factor, double term) {
+  const auto a = eight_times<bytes>(factor);
+  const auto b = eight_times<bytes>(term);
+  Eight<bytes> x[Chains];
+  for (int c = 0; c < Chains; ++c) x[c] = eight_times<bytes>(factor + static_cast<double>(c));
   for (Eigen::Index step = 0; step < steps; ++step) {
 #pragma GCC unroll 32
-    for (int c = 0; c < Chains; ++c) {
-      Update::update(x[c], a, b);
-    }
+    for (int c = 0; c < Chains; ++c) Update::update(x[c], a, b);
   }
   double sum = 0.0;
-  for (const Lanes& chain : x) {
-    for (Eigen::Index l = 0; l < lanes; ++l) {
-      sum += chain[l];
-    }
+  for (const Eight<bytes>& chain : x) {
+    for (int k = 0; k < lanes; ++k) sum += chain[k];
   }
   return sum;
 }
 
-#define BENCH_KERNEL(name, Update, count)                              \
-  BENCH_FOR_EACH_INSTRUCTION_SET                                       \
-  inline double name(Eigen::Index steps, double factor, double term) { \
-    return chains<Update, count>(steps, factor, term);                 \
-  }
-BENCH_KERNEL(product_6, Product, 6)
-BENCH_KERNEL(product_12, Product, 12)
-BENCH_KERNEL(product_24, Product, 24)
-BENCH_KERNEL(fused_6, FusedProduct, 6)
-BENCH_KERNEL(fused_12, FusedProduct, 12)
-BENCH_KERNEL(fused_24, FusedProduct, 24)
-#undef BENCH_KERNEL
+template <int Chains>
+double product(Eigen::Index steps, double factor, double term) {
+  double result = 0.0;
+  llmt::with_widest_registers([&](auto eight) LLMT_INLINE_LAMBDA {
+    result = chains<Product, Chains, decltype(eight)::bytes>(steps, factor, term);
+  });
+  return result;
+}
 
-BENCH_FOR_EACH_INSTRUCTION_SET
+#ifdef LLMT_HAS_INSTRUCTION_SETS
+// The library has no fused multiply-add, so its own choice of registers does not ask for it.
+template <int Chains>
+__attribute__((target("avx512f"))) double fused_512(Eigen::Index steps, double factor, double term) {
+  return chains<FusedProduct, Chains, 64>(steps, factor, term);
+}
+template <int Chains>
+__attribute__((target("avx2,fma"))) double fused_256(Eigen::Index steps, double factor, double term) {
+  return chains<FusedProduct, Chains, 32>(steps, factor, term);
+}
+inline bool has_fused() { return __builtin_cpu_supports("fma") != 0 && __builtin_cpu_supports("avx2") != 0; }
+template <int Chains>
+double fused(Eigen::Index steps, double factor, double term) {
+  const bool is_wide = __builtin_cpu_supports("avx512f") != 0;
+  return is_wide ? fused_512<Chains>(steps, factor, term) : fused_256<Chains>(steps, factor, term);
+}
+#else
+inline bool has_fused() { return false; }
+template <int Chains>
+double fused(Eigen::Index, double, double) {
+  return 0.0;
+}
+#endif
+
 inline double sum(const double* data, Eigen::Index size) {
-  Lanes parts[4] = {};
-  for (Eigen::Index i = 0; i + 4 * lanes <= size; i += 4 * lanes) {
-    for (Eigen::Index k = 0; k < 4; ++k) {
-      parts[k] += *reinterpret_cast<const Lanes*>(data + i + k * lanes);
+  double result = 0.0;
+  llmt::with_widest_registers([&](auto eight) LLMT_INLINE_LAMBDA {
+    using Lanes = decltype(eight);
+    Lanes parts[4] = {};
+    for (Eigen::Index i = 0; i + 4 * lanes <= size; i += 4 * lanes) {
+      for (Eigen::Index k = 0; k < 4; ++k) parts[k] += *reinterpret_cast<const Lanes*>(data + i + k * lanes);
     }
-  }
-  return (parts[0] + parts[1] + parts[2] + parts[3])[0];
+    for (const Lanes& part : parts) result += part[0];
+  });
+  return result;
 }
 
 /// Results are written here so that the compiler does not leave out the work.
@@ -148,12 +171,14 @@ namespace bench {
 /// Floating-point operations per second of double vectors that are multiplied and then added: the limit of code that
 /// is compiled without fused multiply-add.
 inline double peak_product_flops(int threads = 1) {
-  return peak::flops(threads, {{6, peak::product_6}, {12, peak::product_12}, {24, peak::product_24}});
+  return peak::flops(threads,
+                     {{4, peak::product<4>}, {6, peak::product<6>}, {12, peak::product<12>}, {24, peak::product<24>}});
 }
 
 /// The same with fused multiply-add; 0 if the machine has none.
 inline double peak_fused_flops(int threads = 1) {
-  return BENCH_HAS_FMA ? peak::flops(threads, {{6, peak::fused_6}, {12, peak::fused_12}, {24, peak::fused_24}}) : 0.0;
+  if (!peak::has_fused()) return 0.0;
+  return peak::flops(threads, {{4, peak::fused<4>}, {6, peak::fused<6>}, {12, peak::fused<12>}, {24, peak::fused<24>}});
 }
 
 /// Bytes per second that all threads together read in order from an array of `megabytes`, each thread its own part.

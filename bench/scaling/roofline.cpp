@@ -16,18 +16,19 @@ namespace {
 
 constexpr Eigen::Index row_size = 12;  // doubles, 96 bytes
 
-typedef double HalfLanes __attribute__((vector_size(32), aligned(8)));  // NOLINT(modernize-use-using): clang
-
-BENCH_FOR_EACH_INSTRUCTION_SET
 double sum_rows(const double* data, const std::uint32_t* rows, Eigen::Index count) {
-  peak::Lanes first = {};
-  HalfLanes last = {};
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const double* row = data + row_size * rows[i];
-    first += *reinterpret_cast<const peak::Lanes*>(row);
-    last += *reinterpret_cast<const HalfLanes*>(row + 8);
-  }
-  return first[0] + last[0];
+  double sum = 0.0;
+  llmt::with_widest_registers([&](auto eight) LLMT_INLINE_LAMBDA {
+    decltype(eight) first = {};
+    llmt::Quad last = {};
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const double* row = data + row_size * rows[i];
+      first += *reinterpret_cast<const decltype(eight)*>(row);
+      last += llmt::load_quad(row + 8);
+    }
+    sum = first[0] + last[0];
+  });
+  return sum;
 }
 
 // Rows a second, read one after the other or in random order.

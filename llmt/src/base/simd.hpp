@@ -14,6 +14,7 @@
 // attribute.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
+#define LLMT_HAS_INSTRUCTION_SETS
 #define LLMT_FOR_EACH_INSTRUCTION_SET __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define LLMT_FOR_EACH_INSTRUCTION_SET
@@ -21,15 +22,76 @@
 
 /// Makes a function part of each function that calls it, so that it is compiled for the caller's instruction set.
 #define LLMT_INLINE inline __attribute__((always_inline))
+/// The same of a lambda, behind its parameters.
+#define LLMT_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace llmt {
 
-// Types of less alignment than their size are typedefs: clang ignores `aligned` in an alias (using).
+/// Eight doubles, in registers of `register_bytes` each, with the alignment of a double, so that they may be read from
+/// any address. The operators work number by number. GCC takes a vector that is wider than the processor's registers
+/// apart through memory, so code with vectors of 64 bytes alone is nine times slower where registers have 32.
+template <int register_bytes>
+struct Eight {
+  // A typedef: clang ignores `aligned` in an alias (using).
+  typedef double Register __attribute__((vector_size(register_bytes), aligned(8)));  // NOLINT(modernize-use-using)
+  static constexpr int bytes = register_bytes;
+  static constexpr int count = 64 / register_bytes;
+  Register parts[count];
 
-/// Eight doubles with the alignment of one, so that they may be read from any address.
-typedef double Lanes __attribute__((vector_size(64), aligned(8)));  // NOLINT(modernize-use-using)
-static_assert(alignof(Lanes) == alignof(double));
+  LLMT_INLINE double operator[](int k) const { return parts[k / (register_bytes / 8)][k % (register_bytes / 8)]; }
+  LLMT_INLINE Eight& operator+=(const Eight& b) {
+    for (int k = 0; k < count; ++k) parts[k] += b.parts[k];
+    return *this;
+  }
+  LLMT_INLINE Eight& operator-=(const Eight& b) {
+    for (int k = 0; k < count; ++k) parts[k] -= b.parts[k];
+    return *this;
+  }
+  LLMT_INLINE friend Eight operator*(const Eight& a, const Eight& b) {
+    Eight result;
+    for (int k = 0; k < count; ++k) result.parts[k] = a.parts[k] * b.parts[k];
+    return result;
+  }
+  LLMT_INLINE friend Eight operator*(double a, const Eight& b) {
+    Eight result;
+    for (int k = 0; k < count; ++k) result.parts[k] = a * b.parts[k];
+    return result;
+  }
+  LLMT_INLINE friend Eight operator/(double a, const Eight& b) {
+    Eight result;
+    for (int k = 0; k < count; ++k) result.parts[k] = a / b.parts[k];
+    return result;
+  }
+  /// `chosen` where a > b, else 0.
+  LLMT_INLINE friend Eight where_greater(const Eight& a, const Eight& b, const Eight& chosen) {
+    Eight result;
+    for (int k = 0; k < count; ++k) result.parts[k] = a.parts[k] > b.parts[k] ? chosen.parts[k] : Register{};
+    return result;
+  }
+};
 inline constexpr Eigen::Index lanes = 8;
+
+#ifdef LLMT_HAS_INSTRUCTION_SETS
+template <class Kernel>
+__attribute__((target("avx512f"))) void with_512_bits(const Kernel& kernel) {
+  kernel(Eight<64>{});
+}
+template <class Kernel>
+__attribute__((target("avx2"))) void with_256_bits(const Kernel& kernel) {
+  kernel(Eight<32>{});
+}
+#endif
+
+/// Calls kernel(Eight<n>{}) with the widest registers that the processor has. The kernel is compiled for each of their
+/// instruction sets if it is a lambda that is LLMT_INLINE, as is all that it calls.
+template <class Kernel>
+void with_widest_registers(const Kernel& kernel) {
+#ifdef LLMT_HAS_INSTRUCTION_SETS
+  if (__builtin_cpu_supports("avx512f") != 0) return with_512_bits(kernel);
+  if (__builtin_cpu_supports("avx2") != 0) return with_256_bits(kernel);
+#endif
+  kernel(Eight<16>{});
+}
 
 /// `count` rounded up to whole lanes.
 constexpr Eigen::Index padded_to_lanes(Eigen::Index count) { return (count + lanes - 1) / lanes * lanes; }

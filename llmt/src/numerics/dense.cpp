@@ -38,9 +38,9 @@ void pack(const double* from, Eigen::Index stride, Eigen::Index depth, Eigen::In
 }
 
 // Adds the products of strips of A with strips of B, in tiles of tile_rows x lanes.
-LLMT_FOR_EACH_INSTRUCTION_SET
-void multiply_strips(Eigen::Index rows, Eigen::Index columns, Eigen::Index depth, double sign, const double* a,
-                     const double* b, double* c, Eigen::Index c_stride) {
+template <class Lanes>
+LLMT_INLINE void multiply_strips(Eigen::Index rows, Eigen::Index columns, Eigen::Index depth, double sign,
+                                 const double* a, const double* b, double* c, Eigen::Index c_stride) {
   for (Eigen::Index j = 0; j < columns; j += lanes) {
     const double* strip_b = b + j * depth;
     for (Eigen::Index i = 0; i < rows; i += tile_rows) {
@@ -87,7 +87,9 @@ void add_transposed_product(Eigen::Index rows, Eigen::Index columns, Eigen::Inde
     for (Eigen::Index i = 0; i < rows; i += rows_of_c) {
       const Eigen::Index high = std::min(rows_of_c, rows - i);
       pack<tile_rows>(a + k * a_stride + i, a_stride, deep, high, packed_a);
-      multiply_strips(high, columns, deep, sign, packed_a.data(), packed_b.data(), c + i * c_stride, c_stride);
+      with_widest_registers([=, a = packed_a.data(), b = packed_b.data()](auto eight) LLMT_INLINE_LAMBDA {
+        multiply_strips<decltype(eight)>(high, columns, deep, sign, a, b, c + i * c_stride, c_stride);
+      });
     }
   }
 }

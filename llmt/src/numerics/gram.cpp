@@ -40,9 +40,15 @@ struct Packed {
   void prefetch(Eigen::Index) const {}
 };
 
+// Rows of a tile, and its columns as vectors: what fits into 32 registers of 64 bytes, or 16 narrower ones.
+template <class Lanes>
+constexpr int rows_of_tile = Lanes::bytes / 8;
+template <class Lanes>
+constexpr int columns_of_tile = Lanes::bytes == 64 ? 2 : 1;
+
 // Sums f_i f_j over `count` rows, for `Rows` columns i from `first_row` and `Columns` vectors of columns j from
 // `first_column`, in registers.
-template <int Rows, int Columns, class Source>
+template <class Lanes, int Rows, int Columns, class Source>
 LLMT_INLINE void add_tile(const Source& source, Eigen::Index count, Eigen::Index first_row, Eigen::Index first_column,
                           double* gram) {
   Lanes sums[Rows][Columns] = {};
@@ -66,39 +72,41 @@ LLMT_INLINE void add_tile(const Source& source, Eigen::Index count, Eigen::Index
   }
 }
 
-template <int Rows, class Source>
+template <class Lanes, int Rows, class Source>
 LLMT_INLINE void add_tile_row(const Source& source, Eigen::Index count, Eigen::Index first_row, double* gram) {
+  constexpr int columns = columns_of_tile<Lanes>;
   Eigen::Index column = 0;
-  for (; column + lanes <= first_row; column += 2 * lanes) {
-    add_tile<Rows, 2>(source, count, first_row, column, gram);
+  for (; column + (columns - 1) * lanes <= first_row; column += columns * lanes) {
+    add_tile<Lanes, Rows, columns>(source, count, first_row, column, gram);
   }
   if (column <= first_row) {
-    add_tile<Rows, 1>(source, count, first_row, column, gram);
+    add_tile<Lanes, Rows, 1>(source, count, first_row, column, gram);
   }
 }
 
-template <class Source>
+template <class Lanes, class Source>
 LLMT_INLINE void add_tiles(const Source& source, Eigen::Index columns, Eigen::Index count, double* gram) {
-  for (Eigen::Index row = 0; row < columns; row += lanes) {
-    if (columns - row > 4) {
-      add_tile_row<8>(source, count, row, gram);
+  constexpr int rows = rows_of_tile<Lanes>;
+  for (Eigen::Index row = 0; row < columns; row += rows) {
+    if (rows <= 4 || columns - row > 4) {
+      add_tile_row<Lanes, rows>(source, count, row, gram);
     } else {
-      add_tile_row<4>(source, count, row, gram);
+      add_tile_row<Lanes, std::min(rows, 4)>(source, count, row, gram);
     }
   }
 }
 
 // For few columns, or very many: the tiles read the rows where they are.
-LLMT_FOR_EACH_INSTRUCTION_SET
-void add_scattered(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
-                   Eigen::Index following, double* gram) {
-  add_tiles(Scattered{features, columns, rows, following}, columns, count, gram);
+template <class Lanes>
+LLMT_INLINE void add_scattered(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
+                               Eigen::Index following, double* gram) {
+  add_tiles<Lanes>(Scattered{features, columns, rows, following}, columns, count, gram);
 }
 
 // For many columns, and therefore many tiles: the rows are copied into a buffer first.
-LLMT_FOR_EACH_INSTRUCTION_SET
-void add_packed(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
-                Eigen::Index following, double* buffer, double* gram) {
+template <class Lanes>
+LLMT_INLINE void add_packed(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
+                            Eigen::Index following, double* buffer, double* gram) {
   const Scattered source{features, columns, rows, following};
   const Eigen::Index stride = (columns + lanes - 1) / lanes * lanes;
   for (Eigen::Index k = 0; k < count; ++k) {
@@ -109,41 +117,52 @@ void add_packed(const double* features, Eigen::Index columns, const int* rows, E
       *reinterpret_cast<Lanes*>(buffer + k * stride + c) = *reinterpret_cast<const Lanes*>(from + c);
     }
   }
-  add_tiles(Packed{buffer, stride}, columns, count, gram);
+  add_tiles<Lanes>(Packed{buffer, stride}, columns, count, gram);
 }
 
-LLMT_FOR_EACH_INSTRUCTION_SET
-void add_vectors(const double* from, double* to, Eigen::Index size) {
+template <class Lanes>
+LLMT_INLINE void add_vectors(const double* from, double* to, Eigen::Index size) {
   for (Eigen::Index k = 0; k < size; k += lanes) {
     *reinterpret_cast<Lanes*>(to + k) += *reinterpret_cast<const Lanes*>(from + k);
   }
 }
 
-LLMT_INLINE void gather(const double* const* from, Eigen::Index at, Lanes& to) {
-  to = Lanes{from[0][at], from[1][at], from[2][at], from[3][at], from[4][at], from[5][at], from[6][at], from[7][at]};
+template <class Lanes>
+LLMT_INLINE Lanes gather(const double* const* from, Eigen::Index at) {
+  using Register = typename Lanes::Register;
+  if constexpr (Lanes::bytes == 64) {
+    return {Register{from[0][at], from[1][at], from[2][at], from[3][at], from[4][at], from[5][at], from[6][at],
+                     from[7][at]}};
+  } else if constexpr (Lanes::bytes == 32) {
+    return {Register{from[0][at], from[1][at], from[2][at], from[3][at]},
+            Register{from[4][at], from[5][at], from[6][at], from[7][at]}};
+  } else {
+    return {Register{from[0][at], from[1][at]}, Register{from[2][at], from[3][at]}, Register{from[4][at], from[5][at]},
+            Register{from[6][at], from[7][at]}};
+  }
 }
 
 // Eight factorisations at once, one in every lane. Row k of `factor` holds l_k0 d_0, l_k1 d_1, ..., in `unit` l_k0,
 // l_k1, ...; `inverse` holds 1 / d or 0. A residual is one more row, whose pivot is its residual sum of squares.
-LLMT_FOR_EACH_INSTRUCTION_SET
-void evaluate_eight(const double* const* grams, Eigen::Index coefficients, Eigen::Index columns, const double* weights,
-                    double* scratch, double* rss, double* rank) {
+template <class Lanes>
+LLMT_INLINE void evaluate_eight(const double* const* grams, Eigen::Index coefficients, Eigen::Index columns,
+                                const double* weights, double* scratch, double* rss, double* rank) {
   Lanes* row = reinterpret_cast<Lanes*>(scratch);
   Lanes* inverse = row + columns;
   Lanes* unit = inverse + columns;
+  Lanes one;
+  for (auto& part : one.parts) part = typename Lanes::Register{} + 1.0;
   Lanes total = {};
   Lanes ranks = {};
   for (Eigen::Index k = 0; k < columns; ++k) {
     const Eigen::Index begin = GramShape::row_begin(k);
-    Lanes diagonal;
-    gather(grams, begin + k, diagonal);
+    const Lanes diagonal = gather<Lanes>(grams, begin + k);
     Lanes pivot = diagonal;
     const Eigen::Index before = std::min(k, coefficients);
     Lanes* unit_k = unit + k * (k + 1) / 2;
     for (Eigen::Index j = 0; j < before; ++j) {
       const Lanes* unit_j = unit + j * (j + 1) / 2;
-      Lanes sum;
-      gather(grams, begin + j, sum);
+      Lanes sum = gather<Lanes>(grams, begin + j);
       for (Eigen::Index m = 0; m < j; ++m) {
         sum -= row[m] * unit_j[m];
       }
@@ -155,16 +174,14 @@ void evaluate_eight(const double* const* grams, Eigen::Index coefficients, Eigen
       }
     }
     if (k < coefficients) {
-      const auto independent = pivot > pivot_tolerance * diagonal;
-      const Lanes one = Lanes{} + 1.0;
-      inverse[k] = independent ? one / pivot : Lanes{};
-      ranks += independent ? one : Lanes{};
+      const Lanes tolerated = pivot_tolerance * diagonal;
+      inverse[k] = where_greater(pivot, tolerated, 1.0 / pivot);
+      ranks += where_greater(pivot, tolerated, one);
     } else {
       total += weights[k - coefficients] * pivot;
     }
   }
-  total = total > 0.0 ? total : Lanes{};
-  *reinterpret_cast<Lanes*>(rss) = total;
+  *reinterpret_cast<Lanes*>(rss) = where_greater(total, Lanes{}, total);
   *reinterpret_cast<Lanes*>(rank) = ranks;
 }
 
@@ -179,15 +196,21 @@ void add_rows(const Features& features, const int* rows, Eigen::Index count, dou
   alignas(64) double buffer[buffer_size];
   for (Eigen::Index k = 0; k < count; k += chunk) {
     const Eigen::Index size = std::min(chunk, count - k);
-    if (in_place) {
-      add_scattered(data, columns, rows + k, size, count - 1 - k, gram);
-    } else {
-      add_packed(data, columns, rows + k, size, count - 1 - k, buffer, gram);
-    }
+    with_widest_registers([&](auto eight) LLMT_INLINE_LAMBDA {
+      using Lanes = decltype(eight);
+      if (in_place) {
+        add_scattered<Lanes>(data, columns, rows + k, size, count - 1 - k, gram);
+      } else {
+        add_packed<Lanes>(data, columns, rows + k, size, count - 1 - k, buffer, gram);
+      }
+    });
   }
 }
 
-void add(const GramShape& shape, const double* other, double* gram) { add_vectors(other, gram, shape.size()); }
+void add(const GramShape& shape, const double* other, double* gram) {
+  with_widest_registers([&](auto eight)
+                            LLMT_INLINE_LAMBDA { add_vectors<decltype(eight)>(other, gram, shape.size()); });
+}
 
 ResidualSums::ResidualSums(const GramShape& shape, const Eigen::VectorXd& weights)
     : shape_(shape), weights_(weights.begin(), weights.end()) {}
@@ -202,8 +225,10 @@ void ResidualSums::evaluate(const double* const* grams, Eigen::Index count, doub
     }
     std::array<double, 8> sums;
     std::array<double, 8> ranks;
-    evaluate_eight(eight.data(), shape_.coefficients(), shape_.columns(), weights_.data(),
-                   scratch_.front().values.data(), sums.data(), ranks.data());
+    with_widest_registers([&](auto lanes_of) LLMT_INLINE_LAMBDA {
+      evaluate_eight<decltype(lanes_of)>(eight.data(), shape_.coefficients(), shape_.columns(), weights_.data(),
+                                         scratch_.front().values.data(), sums.data(), ranks.data());
+    });
     for (Eigen::Index l = 0; l < std::min(lanes, count - k); ++l) {
       rss[k + l] = sums[l];
       rank[k + l] = static_cast<int>(ranks[l]);

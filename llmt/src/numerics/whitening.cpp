@@ -10,9 +10,9 @@
 namespace llmt {
 namespace {
 
-LLMT_FOR_EACH_INSTRUCTION_SET
-void transform(double* row, Eigen::Index rows, Eigen::Index stride, Eigen::Index regressors, const double* matrix,
-               double* result) {
+template <class Lanes>
+LLMT_INLINE void transform(double* row, Eigen::Index rows, Eigen::Index stride, Eigen::Index regressors,
+                           const double* matrix, double* result) {
   const Eigen::Index width = (regressors + lanes - 1) / lanes * lanes;
   for (Eigen::Index i = 0; i < rows; ++i, row += stride) {
     const double* z = row + 1;
@@ -32,9 +32,9 @@ void transform(double* row, Eigen::Index rows, Eigen::Index stride, Eigen::Index
 
 // Rows are read in whole vectors: columns behind the regressors have coefficient zero, and the numbers behind the last
 // row are finite.
-LLMT_FOR_EACH_INSTRUCTION_SET
-void subtract(double* row, Eigen::Index rows, Eigen::Index stride, Eigen::Index width, Eigen::Index residual,
-              const double* coefficients, double* products, double* squares) {
+template <class Lanes>
+LLMT_INLINE void subtract(double* row, Eigen::Index rows, Eigen::Index stride, Eigen::Index width,
+                          Eigen::Index residual, const double* coefficients, double* products, double* squares) {
   for (Eigen::Index i = 0; i < rows; ++i, row += stride) {
     Lanes fit = {};
     for (Eigen::Index c = 0; c < width; c += lanes) {
@@ -55,7 +55,10 @@ void subtract(double* row, Eigen::Index rows, Eigen::Index stride, Eigen::Index 
 void transform_regressors(Features& features, const std::vector<double>& matrix) {
   const Eigen::Index regressors = features.coefficients() - 1;
   std::vector<double> result(regressors + lanes);
-  transform(features.row(0), features.rows(), features.columns(), regressors, matrix.data(), result.data());
+  with_widest_registers([&](auto eight) LLMT_INLINE_LAMBDA {
+    transform<decltype(eight)>(features.row(0), features.rows(), features.columns(), regressors, matrix.data(),
+                               result.data());
+  });
 }
 
 Remainder subtract_fit(Features& features, Eigen::Index output, const std::vector<double>& coefficients) {
@@ -63,8 +66,11 @@ Remainder subtract_fit(Features& features, Eigen::Index output, const std::vecto
   std::vector<double> padded = coefficients;
   padded.resize(width, 0.0);
   Remainder remainder{std::vector<double>(padded.size(), 0.0), 0.0};
-  subtract(features.row(0), features.rows(), features.columns(), width, features.coefficients() + output, padded.data(),
-           remainder.products.data(), &remainder.squares);
+  with_widest_registers([&](auto eight) LLMT_INLINE_LAMBDA {
+    subtract<decltype(eight)>(features.row(0), features.rows(), features.columns(), width,
+                              features.coefficients() + output, padded.data(), remainder.products.data(),
+                              &remainder.squares);
+  });
   remainder.products.resize(features.coefficients());
   return remainder;
 }
