@@ -10,20 +10,13 @@
 namespace llmt {
 namespace {
 
-LLMT_FOR_EACH_INSTRUCTION_SET
-void multiply(const double* features, Eigen::Index columns, double* products) {
+template <class Lanes>
+LLMT_INLINE void multiply(const double* features, Eigen::Index columns, double* products) {
   for (Eigen::Index i = 0; i < columns; ++i) {
     double* out = products + GramShape::row_begin(i);
     for (Eigen::Index j = 0; j <= i; j += lanes) {
       *reinterpret_cast<Lanes*>(out + j) = features[i] * *reinterpret_cast<const Lanes*>(features + j);
     }
-  }
-}
-
-LLMT_FOR_EACH_INSTRUCTION_SET
-void add_all(const double* from, Eigen::Index size, double* to) {
-  for (Eigen::Index k = 0; k < size; k += lanes) {
-    *reinterpret_cast<Lanes*>(to + k) += *reinterpret_cast<const Lanes*>(from + k);
   }
 }
 
@@ -54,10 +47,12 @@ void RowProducts::set(const Basis& basis, const double* z, double y, double weig
     features_[k] = root * known;
   }
   features_[coefficients] = root * residual;
-  multiply(features_.data(), shape_.columns(), products_.data());
+  with_widest_registers([&](auto eight) LLMT_INLINE_LAMBDA {
+    multiply<decltype(eight)>(features_.data(), shape_.columns(), products_.data());
+  });
 }
 
-void RowProducts::add_to(double* gram) const { add_all(products_.data(), shape_.size(), gram); }
+void RowProducts::add_to(double* gram) const { llmt::add(shape_, products_.data(), gram); }
 
 Eigen::MatrixXd matrix_of(const GramShape& shape, const double* gram) {
   Eigen::MatrixXd matrix(shape.columns(), shape.columns());

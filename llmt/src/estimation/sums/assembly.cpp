@@ -37,12 +37,11 @@ constexpr Eigen::Index leaves_at_once = 4;
 static_assert(leaves_at_once <= ActiveRows::more_columns);
 
 // Rows of outer products times a factor for each use, laid out as in ActiveRows, one row for each use; and their sum.
-LLMT_FOR_EACH_INSTRUCTION_SET
-void scale_rows(std::span<const ActiveRows::Use> uses, const std::vector<double>& factors, const ActiveRows& active,
-                std::vector<double>& scaled, double* sum) {
+template <class Lanes>
+LLMT_INLINE void scale_rows(std::span<const ActiveRows::Use> uses, const std::vector<double>& factors,
+                            const ActiveRows& active, std::vector<double>& scaled, double* sum) {
   const Eigen::Index count = std::ssize(uses);
   const Eigen::Index strip = active.chunk.count() * lanes;
-  scaled.resize(std::ssize(active.outer) / active.chunk.count() * count);
   double* out = scaled.data();
   for (const double* in = active.outer.data(); out != scaled.data() + scaled.size(); in += strip, sum += lanes) {
     Lanes total = {};
@@ -57,9 +56,9 @@ void scale_rows(std::span<const ActiveRows::Use> uses, const std::vector<double>
 
 // Sums over the uses of a leaf of validity x row, for the validities of `leaves_at_once` leaves from `column` on.
 // `sums`: leaves_at_once x padded numbers.
-LLMT_FOR_EACH_INSTRUCTION_SET
-void sum_tile(std::span<const ActiveRows::Use> uses, const RowMajor& validities, Eigen::Index column,
-              const std::vector<double>& scaled, double* sums) {
+template <class Lanes>
+LLMT_INLINE void sum_tile(std::span<const ActiveRows::Use> uses, const RowMajor& validities, Eigen::Index column,
+                          const std::vector<double>& scaled, double* sums) {
   const Eigen::Index numbers = std::ssize(scaled) / std::ssize(uses);
   const double* row = scaled.data();
   for (Eigen::Index begin = 0; begin < numbers; begin += lanes) {
@@ -233,12 +232,17 @@ void Assembly::add(const ActiveRows& active, int leaf, SumsOfLeaf& sums) const {
       sums.products.col(o) += weight * residual * active.regressors.row(use.row).transpose();
     }
   }
-  scale_rows(uses, factors, active, scaled, sums.gram.data());
+  scaled.resize(std::ssize(active.outer) / active.chunk.count() * std::ssize(uses));
+  with_widest_registers([&](auto eight) LLMT_INLINE_LAMBDA {
+    scale_rows<decltype(eight)>(uses, factors, active, scaled, sums.gram.data());
+  });
   const Eigen::Index numbers = padded_to_lanes(packed_);
   of_lot.resize(leaves_at_once * numbers);
   auto next = sums.blocks.lower_bound(active.leaves[first]);
   for (Eigen::Index column = first; column <= active.column[leaf]; column += leaves_at_once) {
-    sum_tile(uses, active.validities, column, scaled, of_lot.data());
+    with_widest_registers([&](auto eight) LLMT_INLINE_LAMBDA {
+      sum_tile<decltype(eight)>(uses, active.validities, column, scaled, of_lot.data());
+    });
     for (Eigen::Index k = column; k < std::min(column + leaves_at_once, active.column[leaf] + 1); ++k) {
       const double* sum = of_lot.data() + (k - column) * numbers;
       // The sum of the products of validities: 0 where the leaves share no row.
