@@ -17,8 +17,10 @@ from cubist import Cubist
 from interpret.glassbox import ExplainableBoostingRegressor
 from lightgbm import LGBMRegressor
 from pyoperon.sklearn import SymbolicRegressor
-from sklearn.ensemble import HistGradientBoostingRegressor
-from sklearn.linear_model import LinearRegression
+from sklearn.ensemble import HistGradientBoostingRegressor, RandomForestRegressor
+from sklearn.linear_model import LinearRegression, RidgeCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 from xgboost import XGBRegressor
 
 WEKA = "/usr/share/java/weka.jar"
@@ -114,8 +116,11 @@ REGRESSORS = {
     "Cubist (20 committees, 5 neighbours)": ("cubist", lambda seed: Cubist(
         random_state=seed, n_committees=20, neighbors=5)),
     "pyoperon": ("pyoperon", lambda seed: SymbolicRegressor(n_threads=1, random_state=seed)),
+    "random forest": ("scikit-learn", lambda seed: RandomForestRegressor(n_jobs=1, random_state=seed)),
+    "ridge": ("scikit-learn", lambda seed: make_pipeline(StandardScaler(), RidgeCV())),
     "least squares": ("scikit-learn", lambda seed: LinearRegression()),
     "M5P": (None, lambda seed: M5P()),
 }
-# Fits or predictions that can take minutes, and the program that pip does not install.
-ONLY_WHEN_NAMED = ["llmt (teach)", "EBM", "APLR", "Cubist (20 committees, 5 neighbours)", "pyoperon", "M5P"]
+# Fits or predictions that can take minutes, the program that pip does not install, and what folds.py compares.
+ONLY_WHEN_NAMED = ["llmt (teach)", "EBM", "APLR", "Cubist (20 committees, 5 neighbours)", "pyoperon", "M5P",
+                   "random forest", "ridge"]

@@ -112,6 +112,7 @@ def work(make, seed, data, seconds, sender):
         result = {"fit_cpu": spent() - before}
         predicted = np.asarray(model.predict(test_x)).ravel()
         result["rmse"] = float(np.sqrt(np.mean((predicted - test_y)**2)))
+        result["r2"] = 1 - result["rmse"]**2 / float(np.var(test_y))
         if not math.isfinite(result["rmse"]):
             result = {"failed": "predictions are not finite"}
         elif hasattr(model, "leaves"):
@@ -141,7 +142,8 @@ def read_results(path):
             for line in map(json.loads, lines)}
 
 
-def measure(options):
+def measure(options, data):
+    """The fits of `data`, (name, split, function that reads the rows), that the results file does not have."""
     from regressors import ONLY_WHEN_NAMED, REGRESSORS, WEKA, Llmt
 
     Llmt.program = options.llmt
@@ -161,7 +163,6 @@ def measure(options):
     versions = {name: importlib.metadata.version(package) if package else "" for name, package in packages.items()}
     done = read_results(options.results)
     options.results.parent.mkdir(exist_ok=True)
-    data = (data_of_sets(options) if options.sets else []) + (data_of_function(options) if options.rows else [])
     for name, split, read in data:
         missing = [(seed, one) for seed in range(options.seeds) for one in names
                    if done.get((name, split, seed, one), {}).get("version") != versions[one]]
@@ -282,6 +283,14 @@ def print_tables(results, base):
             print(f"\n{data}, split {split}, seed {seed}, {regressor}: {line['failed']}")
 
 
+def enter_environment():
+    python = ENVIRONMENT / "bin/python"
+    if not python.exists():
+        sys.exit("run.py: the packages are not there; run with --install first")
+    if pathlib.Path(sys.prefix) != ENVIRONMENT:
+        os.execve(python, [python, *sys.argv], os.environ | ONE_THREAD)
+
+
 def main():
     sys.dont_write_bytecode = True  # no __pycache__ among the sources
     options = arguments()
@@ -289,14 +298,12 @@ def main():
         return install()
     if not options.table and not options.sets and not options.rows:
         sys.exit("run.py: say on which data, with --sets or --rows, or --table; --help explains")
-    python = ENVIRONMENT / "bin/python"
-    if not python.exists():
-        sys.exit("run.py: the packages are not there; run with --install first")
-    if pathlib.Path(sys.prefix) != ENVIRONMENT:
-        os.execve(python, [python, *sys.argv], os.environ | ONE_THREAD)
+    enter_environment()
     if options.table:
         return print_tables(read_results(options.results), options.base)
-    return measure(options)
+    data = (data_of_sets(options) if options.sets else []) + (data_of_function(options) if options.rows else [])
+    return measure(options, data)
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())
