@@ -20,7 +20,7 @@ import sys
 import run
 
 FOLDS = 5
-SMALL = 500  # rows to learn from: below it `llmt fit --boost` blends its sum with other models
+SMALL = 500  # tables with fewer rows have means of their own
 DEFAULT = ["llmt (boost)", "llmt", "ChimeraBoost", "CatBoost", "LightGBM", "XGBoost", "HistGradientBoosting",
            "random forest", "ridge"]
 
@@ -30,7 +30,7 @@ def arguments():
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--names", metavar="NAME,...", help="tables; default: all")
     parser.add_argument("--below", metavar="ROWS", type=int, default=sys.maxsize,
-                        help="only tables with fewer rows to learn from in their largest fold")
+                        help="only tables with fewer rows")
     parser.add_argument("--only", metavar="NAME", action="append",
                         help=f"a regressor; may be repeated; default: {', '.join(DEFAULT)}")
     parser.add_argument("--seconds", type=int, default=300, help="CPU time that a fit may take; default: %(default)s")
@@ -50,13 +50,12 @@ def arguments():
 
 
 def tables(options):
-    """name -> rows to learn from in the largest fold, smallest first."""
+    """name -> rows, smallest first."""
     found = {}
     for path in options.folder.glob("*.csv"):
         with open(path) as file:
             if "y" in next(file).strip().split(","):
-                rows = sum(1 for _ in file)
-                found[path.stem] = rows - rows // FOLDS
+                found[path.stem] = sum(1 for _ in file)
     names = options.names.split(",") if options.names else found
     return {name: found[name] for name in sorted(names, key=lambda name: (found[name], name))
             if found[name] < options.below}
@@ -137,14 +136,16 @@ def print_tables(options):
     names = [name for name in rows if all(len(r2.get((name, method), [])) == FOLDS for method in methods)]
     groups = {
         "All tables": names,
-        f"Fewer than {SMALL} rows to learn from": [name for name in names if rows[name] < SMALL],
-        f"At least {SMALL} rows to learn from": [name for name in names if rows[name] >= SMALL],
+        f"Fewer than {SMALL} rows": [name for name in names if rows[name] < SMALL],
+        f"At least {SMALL} rows": [name for name in names if rows[name] >= SMALL],
         "Not Friedman's": [name for name in names if "fri_c" not in name],
-        f"Not Friedman's, fewer than {SMALL} rows to learn from": [
+        f"Not Friedman's, fewer than {SMALL} rows": [
             name for name in names if "fri_c" not in name and rows[name] < SMALL],
     }
+    printed = [[]]
     for title, group in groups.items():
-        if group:
+        if group not in printed:
+            printed.append(group)
             print_group(title, group, methods, r2, lines, options.base)
     if missing := [name for name in rows if name not in names]:
         print(f"\nNot compared, as folds are missing: {', '.join(missing)}")
