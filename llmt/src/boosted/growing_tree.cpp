@@ -77,40 +77,60 @@ bool TreeGrower::may_have_slope(const GrowingNode& node, int feature) const {
   return std::ssize(node.model.features) < options_.slopes || std::ranges::count(node.model.features, feature) > 0;
 }
 
-TreeGrower::Choice TreeGrower::best_of_feature(std::span<const int> leaves, int feature) const {
-  const BinnedFeature& column = rows_.features[feature];
-  Gains gains{};
-  Gains gains_missing_left{};
-  Histogram histogram;
+TreeGrower::Choice TreeGrower::best_of_features(std::span<const int> leaves, std::span<const int> features) const {
+  struct Column {
+    const BinnedFeature* feature = nullptr;
+    Gains gains;
+    Gains gains_missing_left;
+    Histogram histogram;
+  };
+  std::array<Column, features_at_once> columns;
+  std::array<HistogramOf, features_at_once> histograms;
+  const auto some = std::span(columns).first(features.size());
+  for (std::size_t k = 0; k < features.size(); ++k) {
+    columns[k].feature = &rows_.features[features[k]];
+    columns[k].gains.fill(0.0);
+    if (columns[k].feature->has_missing) columns[k].gains_missing_left.fill(0.0);
+    histograms[k] = {columns[k].feature->bins.data(), &columns[k].histogram};
+  }
   for (const int leaf : leaves) {
     const GrowingNode& node = tree_[leaf];
     if (node.count() == 0) continue;
-    histogram.fill(0);
-    add_to(histogram, column, std::span(order_).subspan(node.begin, node.count()),
+    for (Column& column : some) column.histogram.fill(0);
+    add_to(std::span(histograms).first(features.size()), std::span(order_).subspan(node.begin, node.count()),
            std::span(terms_).subspan(node.begin, node.count()));
-    const bool slopes = may_have_slope(node, feature);
-    add_gains(gains, column, histogram, units_, options_.ridges, slopes, false);
-    if (column.has_missing) {
-      add_gains(gains_missing_left, column, histogram, units_, options_.ridges, slopes, true);
+    for (std::size_t k = 0; k < features.size(); ++k) {
+      const auto& [feature, gains, gains_missing_left, histogram] = columns[k];
+      const bool slopes = may_have_slope(node, features[k]);
+      add_gains(columns[k].gains, *feature, histogram, units_, options_.ridges, slopes, false);
+      if (feature->has_missing) {
+        add_gains(columns[k].gains_missing_left, *feature, histogram, units_, options_.ridges, slopes, true);
+      }
     }
   }
   Choice best{0.0, -1, 0, false};
-  const auto look = [&](const Gains& of_side, bool missing_left) {
+  const auto look = [&](int feature, const Gains& of_side, bool missing_left) {
+    const BinnedFeature& column = rows_.features[feature];
     for (int t = 0; t + 1 < column.num_bins(); ++t) {
       if (of_side[t] > best.gain) best = {of_side[t], feature, column.last_cells[t], missing_left};
     }
   };
-  look(gains, false);
-  if (column.has_missing) look(gains_missing_left, true);
+  for (std::size_t k = 0; k < features.size(); ++k) {
+    look(features[k], columns[k].gains, false);
+    if (columns[k].feature->has_missing) look(features[k], columns[k].gains_missing_left, true);
+  }
   return best;
 }
 
 TreeGrower::Choice TreeGrower::best_split(std::span<const int> leaves, const std::vector<int>& features) const {
-  std::vector<Choice> of_feature(features.size());
-  parallel_for(std::ssize(features), max_threads_,
-               [&](Eigen::Index k) { of_feature[k] = best_of_feature(leaves, features[k]); });
+  std::vector<Choice> of_some((features.size() + features_at_once - 1) / features_at_once);
+  parallel_for(std::ssize(of_some), max_threads_, [&](Eigen::Index k) {
+    const std::size_t first = k * features_at_once;
+    const std::size_t count = std::min(features_at_once, features.size() - first);
+    of_some[k] = best_of_features(leaves, std::span(features).subspan(first, count));
+  });
   Choice best{0.0, -1, 0, false};
-  for (const Choice& one : of_feature) {
+  for (const Choice& one : of_some) {
     if (one.gain > best.gain) best = one;
   }
   return best;

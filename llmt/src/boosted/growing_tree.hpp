@@ -105,7 +105,7 @@ class TreeGrower {
   void begin(const Eigen::VectorXd& residuals);
   void pack(const GrowingNode& node);
   std::vector<int> some_features(Random& random) const;
-  Choice best_of_feature(std::span<const int> leaves, int feature) const;
+  Choice best_of_features(std::span<const int> leaves, std::span<const int> features) const;
   Choice best_split(std::span<const int> leaves, const std::vector<int>& features) const;
   Choice refined(std::span<const int> leaves, Choice choice);
   void gather(const GrowingNode& node, int feature);

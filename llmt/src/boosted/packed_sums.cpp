@@ -58,10 +58,19 @@ PackedUnits units_of(std::span<const double> residuals, std::span<const double> 
   return units;
 }
 
-void add_to(Histogram& histogram, const BinnedFeature& feature, std::span<const int> rows,
-            std::span<const PackedSum> terms) {
-  const std::uint8_t* const bins = feature.bins.data();
-  for (std::size_t k = 0; k < rows.size(); ++k) histogram[bins[rows[k]]] += terms[k];
+void add_to(std::span<const HistogramOf> histograms, std::span<const int> rows, std::span<const PackedSum> terms) {
+  const std::size_t count = rows.size();
+  if (histograms.size() == features_at_once) {
+    const auto [bins, sums] = histograms[0];
+    const auto [other_bins, other_sums] = histograms[1];
+    for (std::size_t k = 0; k < count; ++k) {
+      (*sums)[bins[rows[k]]] += terms[k];
+      (*other_sums)[other_bins[rows[k]]] += terms[k];
+    }
+    return;
+  }
+  const auto [bins, sums] = histograms[0];
+  for (std::size_t k = 0; k < count; ++k) (*sums)[bins[rows[k]]] += terms[k];
 }
 
 }  // namespace llmt

@@ -55,8 +55,15 @@ inline std::int64_t residual_of(PackedSum sum) { return sum - (weight_of(sum) <<
 /// The sums in the bins of a feature; the last one is that of missing values.
 using Histogram = std::array<PackedSum, most_bins + 1>;
 
-/// Adds the rows `rows`, whose terms are `terms`, to the bins of a feature.
-void add_to(Histogram& histogram, const BinnedFeature& feature, std::span<const int> rows,
-            std::span<const PackedSum> terms);
+struct HistogramOf {
+  const std::uint8_t* bins = nullptr;  ///< BinnedFeature::bins
+  Histogram* sums = nullptr;
+};
+
+/// Histograms that are formed in one pass over the rows: the processor adds to one while it waits for another.
+inline constexpr std::size_t features_at_once = 2;
+
+/// Adds the rows `rows`, whose terms are `terms`, to the bins of at most `features_at_once` features.
+void add_to(std::span<const HistogramOf> histograms, std::span<const int> rows, std::span<const PackedSum> terms);
 
 }  // namespace llmt

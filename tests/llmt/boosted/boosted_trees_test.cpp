@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "boosted/growing_tree.hpp"
@@ -28,7 +29,8 @@ llmt::Histogram histogram_of(const llmt::BinnedFeature& feature, const std::vect
   std::vector<llmt::PackedSum> terms;
   for (const int row : rows) terms.push_back(all_terms[row]);
   llmt::Histogram histogram{};
-  llmt::add_to(histogram, feature, rows, terms);
+  const llmt::HistogramOf of_feature{feature.bins.data(), &histogram};
+  llmt::add_to(std::span(&of_feature, 1), rows, terms);
   return histogram;
 }
 
@@ -95,6 +97,17 @@ TEST(PackedSums, OfOneChildAreThoseOfTheNodeMinusThoseOfTheOther) {
     const llmt::Histogram of_right = histogram_of(feature, right, terms);
     for (std::size_t b = 0; b < node.size(); ++b) EXPECT_EQ(node[b] - of_left[b], of_right[b]) << b;
   }
+}
+
+TEST(PackedSums, OfTwoFeaturesAreThoseOfEach) {
+  const Rows rows = some_rows(500, 2, true, 0.1, 4);
+  llmt::PackedUnits units;
+  const std::vector<llmt::PackedSum> terms = packed_rows(rows, units);
+  std::array<llmt::Histogram, 2> sums{};
+  const std::array<llmt::HistogramOf, 2> both{
+      {{rows.binned.features[0].bins.data(), &sums[0]}, {rows.binned.features[1].bins.data(), &sums[1]}}};
+  llmt::add_to(both, rows.all, terms);
+  for (int k = 0; k < 2; ++k) EXPECT_EQ(sums[k], histogram_of(rows.binned.features[k], rows.all, terms));
 }
 
 TEST(PackedSums, AreWithinHalfAUnitARow) {
