@@ -10,7 +10,8 @@ A line of the results file, build/rivals.jsonl, is one fit. What is in there is 
 cut goes on where it stopped. To measure anew, delete the file, or the lines of a regressor.
 
 A fit is a process of its own, forked when the packages are imported and ChimeraBoost is compiled. Its CPU seconds go
-from arrays in memory to the model. Those of the programs llmt and M5P include reading the table and writing the model.
+from arrays in memory to the model, and its MiB are what the process grows by. Those of the programs llmt and M5P include
+reading the table and writing the model, and all of the program's memory.
 """
 import argparse
 import importlib.metadata
@@ -102,14 +103,12 @@ def work(make, seed, data, seconds, sender):
     model = make(seed)
     clock = getattr(model, "clock", resource.RUSAGE_SELF)
 
-    def spent():
-        usage = resource.getrusage(clock)
-        return usage.ru_utime + usage.ru_stime
-
     try:
-        before = spent()
+        before = resource.getrusage(clock)
         model.fit(train_x, train_y)
-        result = {"fit_cpu": spent() - before}
+        after = resource.getrusage(clock)
+        result = {"fit_cpu": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
+                  "fit_mib": (after.ru_maxrss - before.ru_maxrss) / 1024}
         predicted = np.asarray(model.predict(test_x)).ravel()
         result["rmse"] = float(np.sqrt(np.mean((predicted - test_y)**2)))
         result["r2"] = 1 - result["rmse"]**2 / float(np.var(test_y))
@@ -192,10 +191,10 @@ def summarise(results, base):
         for regressor, lines in rows.items():
             rows[regressor] = {"fits": sorted(lines)} | {
                 key: next(iter(lines.values()))[key] for key in ("version", "rows", "inputs")}
-            for key in ("rmse", "fit_cpu", "leaves"):
+            for key in ("rmse", "fit_cpu", "fit_mib", "leaves"):
                 if all(key in line for line in lines.values()):
                     rows[regressor][key] = statistics.mean(line[key] for line in lines.values())
-                if key != "leaves" and all(one in own for one in lines):
+                if key in ("rmse", "fit_cpu") and all(one in own for one in lines):
                     rows[regressor][key + " ratio"] = rows[regressor][key] / statistics.mean(
                         own[one][key] for one in lines)
     return summary
@@ -255,9 +254,9 @@ def print_means(summary, sets, names, base):
 
 def print_functions(summary, functions, names):
     def cell(row):
-        return "{fit_cpu:.2f}; {rmse:.4f}".format(**row) if row else "–"
+        return "{fit_cpu:.2f}; {fit_mib:.0f}; {rmse:.4f}".format(**{"fit_mib": math.nan} | row) if row else "–"
 
-    print_markdown("Synthetic function: CPU seconds of the fit; error", ["", *functions],
+    print_markdown("Synthetic function: CPU seconds and MiB of the fit; error", ["", *functions],
                    [[name, *(cell(summary[data].get(name)) for data in functions)] for name in names])
 
 
