@@ -11,7 +11,8 @@ cut goes on where it stopped. To measure anew, delete the file, or the lines of 
 
 A fit is a process of its own, forked when the packages are imported and ChimeraBoost is compiled. Its CPU seconds go
 from arrays in memory to the model, and its MiB are what the process grows by. Those of the programs llmt and M5P include
-reading the table and writing the model, and all of the program's memory.
+reading the table and writing the model, and their MiB are all that the program has, but at least the size of this
+script's process, of which they are forked.
 """
 import argparse
 import importlib.metadata

@@ -34,8 +34,8 @@ struct BoostOptions {
   bool mean_of_few = false;  ///< of fewer than `fewest_boosted_rows` different rows: their mean, in place of an error
 };
 
-/// A variant of the trees that was compared on held-out rows: after the same few rounds as the others, or, below 5000
-/// rows, when all trees are there.
+/// A variant of the trees that was compared on held-out rows: after the same 50 rounds as the others, or with all
+/// trees. The last two are with all trees where one tree is among them; all are below 500 rows.
 struct BoostVariant {
   std::string name;  ///< "symmetric", "free", "symmetric with pairs", "one tree", ...
   double rmse = 0.0;
@@ -63,9 +63,10 @@ struct BoostResult {
 /// A fifth of the rows is held out, whole groups of them. They decide which trees are taken and when boosting stops.
 /// Then the sum is fitted to all rows with a quarter more trees. With TrainingData::held_out these rows decide instead,
 /// and the sum of the other rows is the result. Below 500 rows each fifth is held out in turn, and the sum is a
-/// weighted mean of four variants and one tree, as fit() makes it; its error is that of the whole procedure, shares and
-/// number of trees chosen without the row. From 500 to 5000 rows it is the mean of the sum and such a tree where the
-/// tree alone is clearly better than the sum on the held-out rows.
+/// weighted mean of two variants and one tree, as fit() makes it; its error is that of the whole procedure, shares and
+/// number of trees chosen without the row. From 500 rows on it is the mean of the sum and such a tree where the tree
+/// alone is better than the sum on the held-out rows. From 5000 rows on that is tried where boosting stops within 200
+/// rounds.
 ///
 /// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
 ///

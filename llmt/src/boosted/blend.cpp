@@ -21,14 +21,14 @@ struct Variant {
   bool has_start = false;
 };
 
-std::vector<Variant> variants_of(const RoundOptions& usual, bool is_rate_given) {
-  RoundOptions constant = usual;
-  constant.tree.slopes = 0;
+// One tree knows of linear models; without it a variant starts from one.
+std::vector<Variant> variants_of(const RoundOptions& usual, bool is_rate_given, bool has_tree) {
   RoundOptions soft = usual;
   soft.tree.softness = usual_softness;
   if (!is_rate_given) soft.rate = soft_rate;
-  return {
-      {"symmetric", usual}, {"constant leaves", constant}, {"soft", soft}, {"soft from a linear model", soft, true}};
+  std::vector<Variant> variants = {{"symmetric", usual}, {"soft", soft}};
+  if (!has_tree) variants.push_back({"soft from a linear model", soft, true});
+  return variants;
 }
 
 // A variant in all folds.
@@ -147,12 +147,14 @@ Eigen::VectorXd shares_of(const Eigen::MatrixXd& residuals, const Eigen::VectorX
 
 Blend blend(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, bool is_rate_given,
             Random& random, Work& work) {
-  const std::vector<Variant> variants = variants_of(usual, is_rate_given);
+  Work growing(work, 0.3);
+  const std::optional<OneTree> tree = one_tree(data, output, usual.max_threads, growing);
+  const std::vector<Variant> variants = variants_of(usual, is_rate_given, tree.has_value());
   BlendFit fit(data, output, random);
   std::vector<Folds> folds;
-  Eigen::MatrixXd residuals(output.size(), std::ssize(variants));
+  Eigen::MatrixXd residuals(output.size(), std::ssize(variants) + (tree ? 1 : 0));
   Blend result;
-  Work searching(work, 0.6);
+  Work searching(work, 0.7 * work.left());
   for (const Variant& variant : variants) {
     Work part(searching, searching.left() / static_cast<double>(variants.size() - folds.size()));
     folds.push_back(fit.in_folds(variant, part));
@@ -161,10 +163,7 @@ Blend blend(const BoostingData& data, const Eigen::VectorXd& output, const Round
       column(data.hold_outs[k].held_out) = folds.back().residuals(k);
     result.variants.push_back({.name = variant.name, .rmse = rmse_of(column, data.rows.weights)});
   }
-  Work growing(work, 0.25);
-  const std::optional<OneTree> tree = one_tree(data, output, usual.max_threads, growing);
   if (tree) {
-    residuals.conservativeResize(Eigen::NoChange, residuals.cols() + 1);
     residuals.rightCols(1) = tree->residuals;
     result.variants.push_back({.name = name_of_tree, .rmse = rmse_of(tree->residuals, data.rows.weights)});
   }
@@ -181,32 +180,31 @@ Blend blend(const BoostingData& data, const Eigen::VectorXd& output, const Round
     if (share == 0.0) continue;
     result.variants[k].share = share;
     result.parts.push_back(k < variants.size() ? fit.on_all(variants[k], folds[k].mean_rounds(no_fold), part)
-                                               : part_of(*tree, output, data.rows));
+                                               : part_of(tree->tree, output, data.rows));
     result.parts.back().share = share;
   }
   result.train_rmse = train_rmse_of(result.parts, data.rows.weights);
   return result;
 }
 
-Blend with_one_tree(const BoostingData& data, const Eigen::VectorXd& output, SumPart sum,
-                    const Eigen::VectorXd& residuals, int max_threads, Work& work) {
+Blend with_one_tree(const BoostingData& data, const Eigen::VectorXd& output, NamedSum sum,
+                    const Eigen::VectorXd& residuals, std::span<const GrowthRule> rules, int max_threads, Work& work) {
   const HoldOut& rows = data.hold_outs.front();
   const Eigen::VectorXd weights = data.rows.weights(rows.held_out);
   Blend result{.parts = {}, .variants = {}, .residuals = residuals, .rmse = rmse_of(residuals, weights)};
-  result.variants.push_back({"symmetric", result.rmse, 1.0});
-  result.parts.push_back(std::move(sum));
+  result.variants.push_back({sum.name, result.rmse, 1.0});
+  result.parts.push_back(std::move(sum.sum));
   result.train_rmse = train_rmse_of(result.parts, data.rows.weights);
   Work trying(work, 0.2);
-  const auto of_tree = held_out_residuals(data, output, rows, max_threads, trying);
-  if (!of_tree) return result;
-  result.variants.push_back({name_of_tree, rmse_of(*of_tree, weights), 0.0});
-  const double noise = 1.0 / std::sqrt(static_cast<double>(weights.size()));
-  if (result.variants.back().rmse >= (1.0 - noise) * result.rmse) return result;
+  const auto tried = try_tree(data, output, rows, rules, max_threads, trying);
+  if (!tried) return result;
+  result.variants.push_back({name_of_tree, rmse_of(tried->residuals, weights), 0.0});
+  if (result.variants.back().rmse >= result.rmse) return result;
   Work growing(work, work.left());
-  const std::optional<OneTree> tree = one_tree(data, output, max_threads, growing);
+  const std::optional<BoostedTree> tree = tree_of_all(data, output, *tried, growing);
   if (!tree) return result;
   Eigen::MatrixXd both(weights.size(), 2);
-  both << residuals, *of_tree;
+  both << residuals, tried->residuals;
   const Eigen::VectorXd shares = shares_of(both, weights, all_of(weights.size()));
   result.residuals = both * shares;
   result.rmse = rmse_of(result.residuals, weights);

@@ -3,11 +3,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "boosted/boosting_data.hpp"
 #include "boosted/sum_parts.hpp"
 #include "llmt/boosted.hpp"
+#include "llmt/options.hpp"
 
 namespace llmt {
 
@@ -25,14 +28,20 @@ struct Blend {
   double train_rmse = 0.0;
 };
 
-/// Few rows: the mean of four variants of a sum and one tree. `output`: standardised. `usual`: symmetric trees, the
-/// first variant. `data.hold_outs` are folds of all rows, so every row is held out.
+/// Few rows: the mean of symmetric trees, soft ones and one tree; where there is no tree, soft ones that start from a
+/// linear model take its place. `output`: standardised. `usual`: symmetric trees, the first variant. `data.hold_outs`
+/// are folds of all rows, so every row is held out.
 Blend blend(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, bool is_rate_given,
             Random& random, Work& work);
 
+struct NamedSum {
+  std::string name;
+  SumPart sum;
+};
+
 /// More rows: the mean of the `sum` of all rows and one tree, if one tree of fewer rows is better than the sum of these
-/// by more than 1 / sqrt(m) of the error on the m held-out rows. There the sum leaves `residuals`. Else the sum alone.
-Blend with_one_tree(const BoostingData& data, const Eigen::VectorXd& output, SumPart sum,
-                    const Eigen::VectorXd& residuals, int max_threads, Work& work);
+/// on the held-out rows. There the sum leaves `residuals`. Else the sum alone. `rules`: by which a tree is tried.
+Blend with_one_tree(const BoostingData& data, const Eigen::VectorXd& output, NamedSum sum,
+                    const Eigen::VectorXd& residuals, std::span<const GrowthRule> rules, int max_threads, Work& work);
 
 }  // namespace llmt

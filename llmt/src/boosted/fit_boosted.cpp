@@ -18,8 +18,13 @@ constexpr Eigen::Index enough_for_fast = 10000;
 constexpr int race_rounds = 50;
 constexpr Eigen::Index most_raced = 10000;  // rows that trees of the race learn from, or
 constexpr Eigen::Index raced_part = 4;      // a quarter of the rows, if that is more
-constexpr int patience_of_few = 200;        // below enough_for_races, whose few held-out rows err
+constexpr int patience_of_few = 200;        // below enough_for_races, whose few held-out rows err,
+constexpr int patience_of_folds = 100;      // and where every row is held out once
 constexpr double race_rate = 0.3;
+// From enough_for_races on one tree is tried where the sum stops early: there is little to find, or one smooth tree is
+// the truth. With more trees the sum is better, and the tree costs time for nothing.
+constexpr std::size_t most_trees_for_one = 200;
+constexpr Eigen::Index most_rows_for_one = 50000;
 constexpr int most_paired = 4;        // inputs whose sums and differences are tried
 constexpr double free_margin = 0.25;  // of 1 / sqrt(held-out rows): by how much a variant must be better
 constexpr double soft_margin = 1.0;
@@ -103,7 +108,7 @@ class OutputFit {
     const Eigen::Index rows = y_.size();
     rounds_.tree = usual_trees(rows);
     rounds_.rate = rows < enough_for_fast ? 0.05 : 0.07;
-    if (rows < enough_for_races) rounds_.patience = patience_of_few;
+    if (rows < enough_for_races) rounds_.patience = data_.hold_outs.size() > 1 ? patience_of_folds : patience_of_few;
     rounds_.max_threads = options_.max_threads;
     name_ = "symmetric";
     if (rows >= enough_for_races && data_.hold_outs.size() == 1) {
@@ -201,6 +206,8 @@ class OutputFit {
     summary.held_out = std::ssize(rows.held_out);
     summary.rows = std::ssize(rows.train);
     residuals_ = sum.rounds.residuals;
+    const bool is_tree_tried = y_.size() < enough_for_races ||
+                               (y_.size() < most_rows_for_one && sum.rounds.trees.size() <= most_trees_for_one);
     if (!data_.is_hold_out_given) {
       summary.rows = y_.size();
       std::vector<int> all(y_.size());
@@ -209,15 +216,24 @@ class OutputFit {
       more.most_rounds = static_cast<int>(std::ceil(more_trees * static_cast<double>(sum.rounds.trees.size())));
       const bool keep = rounds_.tree.symmetric && y_.size() >= enough_for_races;
       const std::vector<GrowingTree> kept = keep ? sum.rounds.trees : std::vector<GrowingTree>();
-      Work part(work, (y_.size() < enough_for_races ? 0.7 : 1.0) * work.left());
+      Work part(work, (is_tree_tried ? 0.7 : 1.0) * work.left());
       sum.rounds = boost(data_.rows, y_, all, {}, kept, more, random_, part);
     }
     summary.variant = name_;
     for (BoostVariant& variant : summary.compared) variant.share = variant.name == name_ ? 1.0 : 0.0;
     summary.train_rmse = sum.rounds.train_rmse * scale_;
-    if (data_.is_hold_out_given || y_.size() >= enough_for_races) return {sum};
+    if (data_.is_hold_out_given || !is_tree_tried) return {sum};
     Work part(work, work.left());
-    return take(with_one_tree(data_, y_, std::move(sum), residuals_, options_.max_threads, part), summary);
+    std::vector<BoostVariant> compared = std::move(summary.compared);
+    for (BoostVariant& variant : compared) variant.share = 0.0;  // of 50 rounds, not of the sum
+    // RD finds a sharp step that RA cannot see; RA is more accurate where all is smooth. A sum that stops early has no
+    // steps left to find.
+    std::vector<GrowthRule> rules = {GrowthRule::ra};
+    if (y_.size() < enough_for_races) rules.push_back(GrowthRule::rd);
+    std::vector<SumPart> parts =
+        take(with_one_tree(data_, y_, {name_, std::move(sum)}, residuals_, rules, options_.max_threads, part), summary);
+    summary.compared.insert(summary.compared.begin(), compared.begin(), compared.end());
+    return parts;
   }
 
   // Few rows: every fold is held out in turn.

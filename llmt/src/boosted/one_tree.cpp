@@ -12,6 +12,14 @@
 namespace llmt {
 namespace {
 
+FitOptions options_of(GrowthRule rule, int max_threads) {
+  FitOptions options;
+  options.rule = rule;
+  options.max_leaves = 24;
+  options.max_threads = max_threads;
+  return options;
+}
+
 // A sum has no split that sends several levels to one side, and no mean of a leaf for an empty cell.
 bool has_numbers_alone(const BoostingData& data) {
   return !data.x.hasNaN() && std::ranges::none_of(data.inputs, &InputColumn::is_categorical);
@@ -98,21 +106,40 @@ std::optional<BoostedTree> translated(const Model& model, const BoostingData& da
   return tree;
 }
 
-FitResult fit_to(const BoostingData& data, const Eigen::VectorXd& output, const HoldOut* chosen_by, int max_threads,
-                 Work& work) {
+TrainingData rows_of(const BoostingData& data, const Eigen::VectorXd& output) {
   TrainingData rows;
   rows.inputs = data.x;
   rows.outputs = output;
   rows.weights = data.rows.weights;
-  if (chosen_by != nullptr) {
-    rows.held_out.assign(chosen_by->held_out.begin(), chosen_by->held_out.end());
-  } else {
-    rows.groups.assign(data.parts.begin(), data.parts.end());
-  }
   rows.may_have_codes = false;
-  FitOptions options;
-  options.max_threads = max_threads;
-  return fit(rows, options, work.progress());
+  return rows;
+}
+
+// A fit with what another one of the same inputs chose, and nothing more to choose.
+FitOptions chosen_options(const FitOptions& compared, const FitSummary& summary, Eigen::Index inputs) {
+  const PartitionSummary& partition = summary.partitions.front();
+  const Candidate& chosen = partition.chosen.candidate;
+  FitOptions options = compared;
+  options.max_leaves = chosen.leaves;
+  // As where blends are candidates, which they were.
+  options.min_leaf_samples = std::max<Eigen::Index>(5, inputs - std::ssize(partition.left_out));
+  options.significance = 1.0;  // the number of leaves is known
+  options.choose_inputs = false;
+  options.validity = chosen.validity.kind == ValidityKind::crisp ? ValidityChoice::crisp : ValidityChoice::blend;
+  options.folds.count = 0;
+  options.expert.estimation = chosen.estimation;
+  options.expert.shrinkages = {chosen.shrinkage};
+  if (chosen.validity.kind == ValidityKind::blend) {
+    options.expert.widths = {chosen.validity.width};
+    options.expert.jumps = {chosen.jump};
+    options.expert.ridges = {chosen.ridge};
+  }
+  if (partition.left_out.empty()) return options;
+  for (int input = 0; input < inputs; ++input) {
+    if (std::ranges::count(partition.left_out, input) == 0) options.split_inputs.push_back(input);
+  }
+  options.regression_inputs = options.split_inputs;
+  return options;
 }
 
 // The residuals of the rows that the model was not fitted to.
@@ -135,7 +162,9 @@ HoldOut part_apart(const std::vector<int>& parts, int part) {
 
 std::optional<OneTree> one_tree(const BoostingData& data, const Eigen::VectorXd& output, int max_threads, Work& work) {
   if (!has_numbers_alone(data)) return std::nullopt;
-  const FitResult fitted = fit_to(data, output, nullptr, max_threads, work);
+  TrainingData rows_in_folds = rows_of(data, output);
+  rows_in_folds.groups.assign(data.parts.begin(), data.parts.end());
+  const FitResult fitted = fit(rows_in_folds, options_of(GrowthRule::ra, max_threads), work.progress());
   std::vector<int> all(output.size());
   std::iota(all.begin(), all.end(), 0);
   const std::optional<BoostedTree> tree = translated(fitted.model, data, all, max_threads);
@@ -150,14 +179,38 @@ std::optional<OneTree> one_tree(const BoostingData& data, const Eigen::VectorXd&
   return result;
 }
 
-std::optional<Eigen::VectorXd> held_out_residuals(const BoostingData& data, const Eigen::VectorXd& output,
-                                                  const HoldOut& rows, int max_threads, Work& work) {
+std::optional<TriedTree> try_tree(const BoostingData& data, const Eigen::VectorXd& output, const HoldOut& rows,
+                                  std::span<const GrowthRule> rules, int max_threads, Work& work) {
   if (!has_numbers_alone(data)) return std::nullopt;
-  return residuals_of(fit_to(data, output, &rows, max_threads, work).model, data, output, rows, max_threads);
+  TrainingData divided = rows_of(data, output);
+  divided.held_out.assign(rows.held_out.begin(), rows.held_out.end());
+  const Eigen::VectorXd weights = data.rows.weights(rows.held_out);
+  std::optional<TriedTree> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < rules.size(); ++k) {
+    Work part(work, work.left() / static_cast<double>(rules.size() - k));
+    const FitOptions options = options_of(rules[k], max_threads);
+    const FitResult fitted = fit(divided, options, part.progress());
+    const auto residuals = residuals_of(fitted.model, data, output, rows, max_threads);
+    if (!residuals) continue;
+    const double squares = residuals->cwiseAbs2().dot(weights);
+    if (squares >= least) continue;
+    least = squares;
+    best = TriedTree{*residuals, chosen_options(options, fitted.summary, data.x.cols())};
+  }
+  return best;
 }
 
-SumPart part_of(const OneTree& one, const Eigen::VectorXd& output, const BinnedRows& rows) {
-  SumPart part{.rounds = {}, .start = {one.tree}};
+std::optional<BoostedTree> tree_of_all(const BoostingData& data, const Eigen::VectorXd& output, const TriedTree& tried,
+                                       Work& work) {
+  const FitResult fitted = fit(rows_of(data, output), tried.options, work.progress());
+  std::vector<int> all(output.size());
+  std::iota(all.begin(), all.end(), 0);
+  return translated(fitted.model, data, all, tried.options.max_threads);
+}
+
+SumPart part_of(const BoostedTree& tree, const Eigen::VectorXd& output, const BinnedRows& rows) {
+  SumPart part{.rounds = {}, .start = {tree}};
   part.rounds.residuals = output - values_of(part.start, rows);
   return part;
 }
