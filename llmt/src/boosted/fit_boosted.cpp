@@ -25,6 +25,7 @@ constexpr double race_rate = 0.3;
 // the truth. With more trees the sum is better, and the tree costs time for nothing.
 constexpr std::size_t most_trees_for_one = 200;
 constexpr Eigen::Index most_rows_for_one = 50000;
+constexpr Eigen::Index most_inputs_for_one = 32;
 constexpr int most_paired = 4;        // inputs whose sums and differences are tried
 constexpr double free_margin = 0.25;  // of 1 / sqrt(held-out rows): by how much a variant must be better
 constexpr double soft_margin = 1.0;
@@ -206,8 +207,9 @@ class OutputFit {
     summary.held_out = std::ssize(rows.held_out);
     summary.rows = std::ssize(rows.train);
     residuals_ = sum.rounds.residuals;
-    const bool is_tree_tried = y_.size() < enough_for_races ||
-                               (y_.size() < most_rows_for_one && sum.rounds.trees.size() <= most_trees_for_one);
+    const bool is_tree_tried =
+        y_.size() < enough_for_races || (y_.size() < most_rows_for_one && data_.x.cols() <= most_inputs_for_one &&
+                                         sum.rounds.trees.size() <= most_trees_for_one);
     if (!data_.is_hold_out_given) {
       summary.rows = y_.size();
       std::vector<int> all(y_.size());

@@ -20,9 +20,13 @@ FitOptions options_of(GrowthRule rule, int max_threads) {
   return options;
 }
 
+// With more inputs the choice among them takes minutes, and a sum seconds.
+constexpr Eigen::Index most_inputs = 100;
+
 // A sum has no split that sends several levels to one side, and no mean of a leaf for an empty cell.
-bool has_numbers_alone(const BoostingData& data) {
-  return !data.x.hasNaN() && std::ranges::none_of(data.inputs, &InputColumn::is_categorical);
+bool may_have_tree(const BoostingData& data) {
+  return data.x.cols() <= most_inputs && !data.x.hasNaN() &&
+         std::ranges::none_of(data.inputs, &InputColumn::is_categorical);
 }
 
 bool is_sayable(const Model& model) {
@@ -161,7 +165,7 @@ HoldOut part_apart(const std::vector<int>& parts, int part) {
 }  // namespace
 
 std::optional<OneTree> one_tree(const BoostingData& data, const Eigen::VectorXd& output, int max_threads, Work& work) {
-  if (!has_numbers_alone(data)) return std::nullopt;
+  if (!may_have_tree(data)) return std::nullopt;
   TrainingData rows_in_folds = rows_of(data, output);
   rows_in_folds.groups.assign(data.parts.begin(), data.parts.end());
   const FitResult fitted = fit(rows_in_folds, options_of(GrowthRule::ra, max_threads), work.progress());
@@ -181,7 +185,7 @@ std::optional<OneTree> one_tree(const BoostingData& data, const Eigen::VectorXd&
 
 std::optional<TriedTree> try_tree(const BoostingData& data, const Eigen::VectorXd& output, const HoldOut& rows,
                                   std::span<const GrowthRule> rules, int max_threads, Work& work) {
-  if (!has_numbers_alone(data)) return std::nullopt;
+  if (!may_have_tree(data)) return std::nullopt;
   TrainingData divided = rows_of(data, output);
   divided.held_out.assign(rows.held_out.begin(), rows.held_out.end());
   const Eigen::VectorXd weights = data.rows.weights(rows.held_out);

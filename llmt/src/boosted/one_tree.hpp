@@ -18,11 +18,10 @@ struct OneTree {
   Eigen::VectorXd residuals;  ///< of every row, of the tree of its fold, which was fitted without it
 };
 
-/// The tree that fit() makes by the rule RA with at most 24 leaves, BoostingData::parts being its folds: it takes half
-/// of the time of the default rule, and less with more rows, and is more accurate where one tree is better than a sum.
-/// It is written as a tree of a sum without its guards. In their place a leaf is held to the values of its own model in
-/// the rows that reach it, widened by a tenth. Nothing where a sum cannot say it: categorical inputs, empty cells,
-/// products in local models, or more than `most_leaf_slopes` slopes in a leaf.
+/// The tree that fit() makes by the rule RA with at most 24 leaves, BoostingData::parts being its folds. It is written
+/// as a tree of a sum without its guards. In their place a leaf is held to the values of its own model in the rows that
+/// reach it, widened by a tenth. Nothing where a sum cannot say it: categorical inputs, empty cells, products in local
+/// models, or more than `most_leaf_slopes` slopes in a leaf; nor with more than 100 inputs.
 std::optional<OneTree> one_tree(const BoostingData& data, const Eigen::VectorXd& output, int max_threads, Work& work);
 
 /// A tree of some rows, chosen by others.

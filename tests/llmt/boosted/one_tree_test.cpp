@@ -137,6 +137,8 @@ TEST(OneTree, IsNotThereWhereASumCannotSayIt) {
   for (Eigen::Index i = 0; i < 100; ++i) data.inputs(i, 1) = static_cast<double>(i % 3);
   data.categorical_inputs = {1};
   EXPECT_FALSE(has_one());
+  data = smooth(100, 101, 0.1, 4);
+  EXPECT_FALSE(has_one());
 }
 
 // Smooth, with inputs that have no effect: the tree leaves them out.
