@@ -34,8 +34,8 @@ struct BoostOptions {
   bool mean_of_few = false;  ///< of fewer than `fewest_boosted_rows` different rows: their mean, in place of an error
 };
 
-/// A variant of the trees that was compared on held-out rows: after the same 50 rounds as the others, or with all
-/// trees. The last two are with all trees where one tree is among them; all are below 500 rows.
+/// A variant of the trees that was compared on held-out rows: with all its trees, or after 50 rounds. From 5000 rows on
+/// they are compared after 50 rounds. If one tree is tried then, the sum with all its trees and the one tree come last.
 struct BoostVariant {
   std::string name;  ///< "symmetric", "free", "symmetric with pairs", "one tree", ...
   double rmse = 0.0;
@@ -65,8 +65,8 @@ struct BoostResult {
 /// and the sum of the other rows is the result. Below 500 rows each fifth is held out in turn, and the sum is a
 /// weighted mean of two variants and one tree, as fit() makes it; its error is that of the whole procedure, shares and
 /// number of trees chosen without the row. From 500 rows on it is the mean of the sum and such a tree where the tree
-/// alone is better than the sum on the held-out rows. From 5000 rows on that is tried where boosting stops within 200
-/// rounds.
+/// alone is better than the sum on the held-out rows. From 5000 to 50 000 rows, with at most 32 inputs, that is tried
+/// where boosting stops within 200 rounds; with more rows, or more than 100 inputs, never.
 ///
 /// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
 ///

@@ -29,7 +29,7 @@ namespace llmt {
 
 /// Eight doubles, in registers of `register_bytes` each, with the alignment of a double, so that they may be read from
 /// any address. The operators work number by number. GCC takes a vector that is wider than the processor's registers
-/// apart through memory, so code with vectors of 64 bytes alone is nine times slower where registers have 32.
+/// apart through memory, so code with vectors of 64 bytes alone is about ten times slower where registers have 32.
 template <int register_bytes>
 struct Eight {
   // A typedef: clang ignores `aligned` in an alias (using).
@@ -83,7 +83,7 @@ __attribute__((target("avx2"))) void with_256_bits(const Kernel& kernel) {
 #endif
 
 /// Calls kernel(Eight<n>{}) with the widest registers that the processor has. The kernel is compiled for each of their
-/// instruction sets if it is a lambda that is LLMT_INLINE, as is all that it calls.
+/// instruction sets if it is an LLMT_INLINE_LAMBDA and all that it calls is LLMT_INLINE.
 template <class Kernel>
 void with_widest_registers(const Kernel& kernel) {
 #ifdef LLMT_HAS_INSTRUCTION_SETS

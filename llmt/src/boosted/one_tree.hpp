@@ -35,6 +35,7 @@ struct TriedTree {
 std::optional<TriedTree> try_tree(const BoostingData& data, const Eigen::VectorXd& output, const HoldOut& rows,
                                   std::span<const GrowthRule> rules, int max_threads, Work& work);
 
+/// The same tree, fitted to all rows. Nothing if a sum cannot say it.
 std::optional<BoostedTree> tree_of_all(const BoostingData& data, const Eigen::VectorXd& output, const TriedTree& tried,
                                        Work& work);
 
