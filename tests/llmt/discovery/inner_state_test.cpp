@@ -215,15 +215,14 @@ TEST(InnerState, ACorrectionThatMakesTheGapLargerIsWorse) {
   EXPECT_TRUE(is_worse(failed));
 }
 
-// The filter of a recording: a resonance of so much damping is none.
+// The filter of a recording: a resonance of so much damping is none. One log: others would differ by noise alone, which
+// is a fortieth of the friction.
 TEST(InnerState, WhatHardlyRingsIsNoResonance) {
   const auto torque = [](double t) { return nominal(t) + (motion(t, 1, one) < 0.0 ? -8.0 : 8.0); };
-  for (const std::uint64_t seed : {1u, 2u, 3u}) {
-    Log log = log_of(seed, 0.2, torque);
-    for (Eigen::Index i = 0; i < rows; ++i) log.simulated(i, 0) = torque(log.inputs.instants(i));
-    log.measured.values.col(0) -= 0.6 * integrated(log.inputs.instants, 2.0 * std::numbers::pi * 6.0, 0.6, torque);
-    for (const FoundTerm& found : missing_from(log).found) EXPECT_NE(found.family, "resonance") << seed;
-  }
+  Log log = log_of(1, 0.2, torque);
+  for (Eigen::Index i = 0; i < rows; ++i) log.simulated(i, 0) = torque(log.inputs.instants(i));
+  log.measured.values.col(0) -= 0.6 * integrated(log.inputs.instants, 2.0 * std::numbers::pi * 6.0, 0.6, torque);
+  for (const FoundTerm& found : missing_from(log).found) EXPECT_NE(found.family, "resonance");
 }
 
 TEST(InnerState, DerivativesOfPolynomialsAreExact) {

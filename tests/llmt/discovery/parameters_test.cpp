@@ -94,13 +94,13 @@ TEST(Parameters, AloneAreParametersAndNoTerms) {
 }
 
 TEST(Parameters, ThatAreRightAreNotSaidToBeOff) {
-  // 40 draws; the rate is 0.3 % for the parameters and for the terms.
+  // The rate is 0.3 % for the parameters and for the terms: no alarm in 20 draws has a probability of 89 %.
   int alarms = 0;
-  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const Cart own = cart(seed, 3.0, 1.0, 0.0, 0.05);
     if (missing_from(own, own.nominal(3.0, 1.0)).answer != Answer::nothing_missing) ++alarms;
   }
-  EXPECT_LE(alarms, 1);
+  EXPECT_EQ(alarms, 0);
 }
 
 TEST(Parameters, BesideAMissingEffectBothAreRight) {

@@ -90,9 +90,10 @@ TEST(BoostedAttribution, AddsUpToThePredictionOfAFittedSum) {
   EXPECT_LT((found.predictions.col(0) - sums).array().operator-(found.reference(0)).abs().maxCoeff(), 1e-9);
   // The input that the output does not depend on has the least.
   Eigen::Index least = 0;
-  llmt::importance(model, data.inputs).row(0).minCoeff(&least);
+  const Eigen::MatrixXd importance = llmt::importance(model, data.inputs.topRows(100));
+  importance.row(0).minCoeff(&least);
   EXPECT_EQ(least, 3);
-  EXPECT_NEAR(llmt::importance(model, data.inputs).sum(), 1.0, 1e-12);
+  EXPECT_NEAR(importance.sum(), 1.0, 1e-12);
 }
 
 TEST(BoostedAttribution, IsTheSameBytesAtAnyNumberOfThreads) {

@@ -139,7 +139,7 @@ std::vector<Case> cases() {
 constexpr Eigen::Index rows = 600;
 
 TEST(Counts, AreRepeatedRowsForEveryOption) {
-  constexpr Eigen::Index few = 300;  // there are many options
+  constexpr Eigen::Index few = 200;  // there are many options
   const llmt::TrainingData data = table(few, 1);
   for (const Case& each : cases()) {
     SCOPED_TRACE(each.name);
@@ -177,16 +177,17 @@ TEST(Counts, AreRepeatedRowsWhereTheCallerHoldsRowsOut) {
 
 // The rows that a fold holds out, and the importance that leaves inputs out, are of the rows as they count.
 TEST(Counts, AreRepeatedRowsWithUselessInputsAndCodes) {
-  llmt::TrainingData data = of_one_output(table(rows, 8));
+  constexpr Eigen::Index few = 400;
+  llmt::TrainingData data = of_one_output(table(few, 8));
   llmt::Random random(9);
   data.categorical_inputs.clear();
   const std::vector<double> of_code = {0.0, 3.0, -2.0, 1.0};
-  for (Eigen::Index i = 0; i < rows; ++i) data.outputs(i, 0) += of_code[static_cast<std::size_t>(data.inputs(i, 3))];
+  for (Eigen::Index i = 0; i < few; ++i) data.outputs(i, 0) += of_code[static_cast<std::size_t>(data.inputs(i, 3))];
   data.inputs.conservativeResize(Eigen::NoChange, 9);
   for (double& value : data.inputs.rightCols(4).reshaped()) value = random.normal();
-  for (const Counts& counts : {random_counts(rows, 10), mostly_one(rows)}) {
+  for (const Counts& counts : {random_counts(few, 10), mostly_one(few)}) {
     llmt::TrainingData of_counts = data;
-    of_counts.weights = Eigen::Map<const Eigen::VectorXi>(counts.data(), rows).cast<double>();
+    of_counts.weights = Eigen::Map<const Eigen::VectorXi>(counts.data(), few).cast<double>();
     const llmt::FitResult result = llmt::fit(of_counts);
     EXPECT_FALSE(result.summary.codes.compared.empty());
     EXPECT_GT(result.summary.partitions[0].input_steps.size(), 1U);
