@@ -25,7 +25,7 @@ def quick(**options):
 
 
 def test_check_estimator():
-    meet_scikit_learn(BoostedLocalLinearTreeRegressor())
+    meet_scikit_learn(quick())
 
 
 @pytest.mark.parametrize("rows", [300, 900])  # with five hold-outs, and with one

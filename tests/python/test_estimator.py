@@ -27,7 +27,7 @@ def test_check_estimator():
 
 @pytest.mark.parametrize("options", [{}, {"validity": "crisp"}, {"rule": "retis"}, {"local_models": "auto"}, {"loss": "tukey"}])
 def test_a_weight_is_a_number_of_copies(options):
-    X, y = stepped(600)
+    X, y = stepped(300)
     weights = np.random.default_rng(1).integers(0, 4, len(y))
     repeated = LocalLinearTreeRegressor(**options).fit(np.repeat(X, weights, axis=0), np.repeat(y, weights))
     weighted = LocalLinearTreeRegressor(**options).fit(X, y, sample_weight=weights)
@@ -36,7 +36,7 @@ def test_a_weight_is_a_number_of_copies(options):
 
 
 def test_same_bytes_for_any_number_of_threads_and_any_order_in_memory():
-    X, y = stepped(400)
+    X, y = stepped(200)
     orders = [(2, np.asfortranarray(X)), (2, X[:, ::-1][:, ::-1]), (2, X.tolist())]
     texts = {
         LocalLinearTreeRegressor(n_jobs=jobs).fit(rows, y).to_json() for jobs, rows in [(1, X), (2, X), (5, X), *orders]
@@ -137,12 +137,12 @@ def test_a_wrong_parameter_is_named(options, words):
 
 
 def test_several_targets():
-    X, y = stepped(400)
+    X, y = stepped(200)
     both = np.column_stack([y, -2 * y])
     fitted = LocalLinearTreeRegressor().fit(X, both)
-    assert fitted.predict(X).shape == (400, 2)
-    assert fitted.predict_interval(X).shape == (400, 2, 2)
-    assert LocalLinearTreeRegressor().fit(X, y.reshape(-1, 1)).predict(X).shape == (400, 1)
+    assert fitted.predict(X).shape == (200, 2)
+    assert fitted.predict_interval(X).shape == (200, 2, 2)
+    assert LocalLinearTreeRegressor().fit(X, y.reshape(-1, 1)).predict(X).shape == (200, 1)
 
 
 def test_partial_fit_goes_on_where_it_stopped():
@@ -180,7 +180,7 @@ def test_only_streams_of_the_same_columns_are_merged():
 
 
 def test_fits_in_threads_give_the_same_bytes():
-    X, y = stepped(400)
+    X, y = stepped(200)
     expected = LocalLinearTreeRegressor(n_jobs=1).fit(X, y).to_json()
     with ThreadPoolExecutor(4) as pool:
         texts = list(pool.map(lambda _: LocalLinearTreeRegressor(n_jobs=1).fit(X, y).to_json(), range(8)))
@@ -188,7 +188,7 @@ def test_fits_in_threads_give_the_same_bytes():
 
 
 def _digest(seed):
-    X, y = stepped(400, seed)
+    X, y = stepped(200, seed)
     return hashlib.sha256(LocalLinearTreeRegressor().fit(X, y).to_json().encode()).hexdigest()
 
 

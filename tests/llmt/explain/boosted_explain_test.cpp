@@ -79,7 +79,7 @@ TEST(BoostedAttribution, AddsUpToThePredictionOfAFittedSum) {
     data.outputs(i, 0) = std::abs(x(0)) + x(1) * x(2) + (x(4) == 1.0 ? 2.0 : 0.0) + 0.1 * random.normal();
   }
   data.categorical_inputs = {4};
-  const llmt::BoostedModel model = llmt::fit_boosted(data).model;
+  const llmt::BoostedModel model = llmt::fit_boosted(data, {.max_rounds = 60}).model;
   const Eigen::MatrixXd background = llmt::background_of(data.inputs, 30);
   ASSERT_EQ(background.rows(), 30);
   const Eigen::MatrixXd x = data.inputs.topRows(25);
@@ -90,7 +90,7 @@ TEST(BoostedAttribution, AddsUpToThePredictionOfAFittedSum) {
   EXPECT_LT((found.predictions.col(0) - sums).array().operator-(found.reference(0)).abs().maxCoeff(), 1e-9);
   // The input that the output does not depend on has the least.
   Eigen::Index least = 0;
-  const Eigen::MatrixXd importance = llmt::importance(model, data.inputs.topRows(100));
+  const Eigen::MatrixXd importance = llmt::importance(model, data.inputs.topRows(40));
   importance.row(0).minCoeff(&least);
   EXPECT_EQ(least, 3);
   EXPECT_NEAR(importance.sum(), 1.0, 1e-12);
