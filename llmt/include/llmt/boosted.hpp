@@ -26,7 +26,8 @@ inline constexpr Eigen::Index fewest_boosted_rows = 10;
 inline constexpr int most_boosted_levels = 50;
 
 struct BoostOptions {
-  /// Factor on every tree. 0: 0.05 below 10 000 rows, else 0.07; 0.1 where the trees are soft.
+  /// Factor on every tree. 0: 0.05 below 10 000 rows, 0.1 above 100 000 and where the trees are soft,
+  /// else 0.07.
   double rate = 0.0;
   int max_rounds = 2000;     ///< trees of an output at most, before the sum is fitted to all rows
   std::uint64_t seed = 1;    ///< of the rows that are held out, and of the features that a split looks at
@@ -60,13 +61,14 @@ struct BoostResult {
 
 /// Fits a sum of trees to each output.
 ///
-/// A fifth of the rows is held out, whole groups of them. They decide which trees are taken and when boosting stops.
-/// Then the sum is fitted to all rows with a quarter more trees. With TrainingData::held_out these rows decide instead,
-/// and the sum of the other rows is the result. Below 500 rows each fifth is held out in turn, and the sum is a
-/// weighted mean of two variants and one tree, as fit() makes it; its error is that of the whole procedure, shares and
-/// number of trees chosen without the row. From 500 rows on it is the mean of the sum and such a tree where the tree
-/// alone is better than the sum on the held-out rows. From 5000 to 50 000 rows, with at most 32 inputs, that is tried
-/// where boosting stops within 200 rounds; with more rows, or more than 100 inputs, never.
+/// A fifth of the rows is held out, of more than 100 000 rows about 20 000, whole groups of them. They decide which
+/// trees are taken and when boosting stops. Then the sum is fitted to all rows with a quarter more trees, if more than
+/// a twentieth was held out. With TrainingData::held_out these rows decide instead, and the sum of the other rows is
+/// the result. Below 500 rows each fifth is held out in turn, and the sum is a weighted mean of two variants and one
+/// tree, as fit() makes it; its error is that of the whole procedure, shares and number of trees chosen without the
+/// row. From 500 rows on it is the mean of the sum and such a tree where the tree alone is better than the sum on the
+/// held-out rows. From 5000 to 50 000 rows, with at most 32 inputs, that is tried where boosting stops within 200
+/// rounds; with more rows, or more than 100 inputs, never.
 ///
 /// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
 ///

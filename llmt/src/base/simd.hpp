@@ -104,12 +104,15 @@ constexpr Eigen::Index quad = 4;
 /// `count` rounded up to whole quads.
 constexpr Eigen::Index padded_to_quads(Eigen::Index count) { return (count + quad - 1) / quad * quad; }
 
+/// A quad at any address. A typedef: clang ignores `aligned` in an alias (using).
+typedef double QuadAnywhere __attribute__((vector_size(32), aligned(8), may_alias));  // NOLINT(modernize-use-using)
+static_assert(alignof(QuadAnywhere) == alignof(double));
+
 /// Loads a quad from any address.
-LLMT_INLINE Quad load_quad(const double* from) {
-  typedef double Anywhere __attribute__((vector_size(32), aligned(8), may_alias));  // NOLINT(modernize-use-using)
-  static_assert(alignof(Anywhere) == alignof(double));
-  return *reinterpret_cast<const Anywhere*>(from);
-}
+LLMT_INLINE Quad load_quad(const double* from) { return *reinterpret_cast<const QuadAnywhere*>(from); }
+
+/// Adds to the four doubles at any address.
+LLMT_INLINE void add_to_quad(double* to, Quad values) { *reinterpret_cast<QuadAnywhere*>(to) += values; }
 
 /// Loads the first `count` numbers (at least one) of a quad from any address; the others are zero.
 LLMT_INLINE Quad load_quad(const double* from, Eigen::Index count) {

@@ -7,21 +7,35 @@
 namespace llmt {
 namespace {
 
+struct RowOfValue {
+  double value = 0.0;
+  int row = 0;
+};
+
+// The rows that have a value, by their values; equal ones as they come.
+std::vector<RowOfValue> by_values(const Eigen::VectorXd& values) {
+  std::vector<RowOfValue> rows;
+  rows.reserve(values.size());
+  for (int i = 0; i < values.size(); ++i) {
+    if (!std::isnan(values(i))) rows.push_back({values(i), i});
+  }
+  std::ranges::sort(rows, [](const RowOfValue& a, const RowOfValue& b) {
+    return a.value < b.value || (a.value == b.value && a.row < b.row);
+  });
+  return rows;
+}
+
 struct Distinct {
   double value = 0.0;
   double weight = 0.0;
 };
 
-std::vector<Distinct> distinct_values(const Eigen::VectorXd& values, const Eigen::VectorXd& weights) {
-  std::vector<Eigen::Index> order;
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (!std::isnan(values(i)) && weights(i) > 0.0) order.push_back(i);
-  }
-  std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return values(i); });
+std::vector<Distinct> distinct_values(const std::vector<RowOfValue>& rows, const Eigen::VectorXd& weights) {
   std::vector<Distinct> result;
-  for (const Eigen::Index i : order) {
-    if (result.empty() || result.back().value < values(i)) result.push_back({values(i), 0.0});
-    result.back().weight += weights(i);
+  for (const auto [value, row] : rows) {
+    if (weights(row) <= 0.0) continue;
+    if (result.empty() || result.back().value < value) result.push_back({value, 0.0});
+    result.back().weight += weights(row);
   }
   return result;
 }
@@ -57,7 +71,8 @@ std::vector<int> cut(const std::vector<double>& weights, int most) {
 BinnedFeature bin_feature(BoostedFeature feature, const Eigen::VectorXd& values, const Eigen::VectorXd& weights) {
   BinnedFeature result;
   result.feature = feature;
-  const std::vector<Distinct> distinct = distinct_values(values, weights);
+  const std::vector<RowOfValue> rows = by_values(values);
+  const std::vector<Distinct> distinct = distinct_values(rows, weights);
   if (!distinct.empty()) {
     result.low = distinct.front().value;
     result.high = distinct.back().value;
@@ -88,21 +103,19 @@ BinnedFeature bin_feature(BoostedFeature feature, const Eigen::VectorXd& values,
     }
     result.centres.push_back(weight > 0.0 ? sum / weight : 0.0);
   }
-  result.cells.resize(values.size());
+  result.has_missing = std::ssize(rows) < values.size();
+  result.cells.assign(values.size(), missing_cell);
+  std::size_t cell = 0;
+  for (const auto [value, row] : rows) {
+    while (cell < result.edges.size() && result.edges[cell] < value) ++cell;
+    result.cells[row] = static_cast<std::uint16_t>(cell);
+  }
   result.bins.resize(values.size());
   result.values.resize(values.size());
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (std::isnan(values(i))) {
-      result.cells[i] = missing_cell;
-      result.bins[i] = missing_bin;
-      result.values[i] = 0.0F;
-      result.has_missing = true;
-      continue;
-    }
-    result.cells[i] =
-        static_cast<std::uint16_t>(std::ranges::lower_bound(result.edges, values(i)) - result.edges.begin());
-    result.bins[i] = bin_of_cell[result.cells[i]];
-    result.values[i] = static_cast<float>(values(i));
+    const bool is_missing = result.cells[i] == missing_cell;
+    result.bins[i] = is_missing ? missing_bin : bin_of_cell[result.cells[i]];
+    result.values[i] = is_missing ? 0.0F : static_cast<float>(values(i));
   }
   return result;
 }

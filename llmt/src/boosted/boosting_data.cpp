@@ -24,7 +24,12 @@ constexpr double largest_extent = 1e100;  // sums of two standardised inputs sta
 
 // Below this number of rows one hold-out decides by chance: five of them decide together.
 constexpr Eigen::Index few_rows = 500;
-constexpr Eigen::Index num_parts = 5;
+constexpr Eigen::Index fewest_parts = 5;
+// Above this number of rows a part of them decides as well.
+constexpr Eigen::Index many_rows = 100000;
+constexpr Eigen::Index rows_of_part = 20000;
+
+Eigen::Index num_parts_of(Eigen::Index rows) { return rows > many_rows ? rows / rows_of_part : fewest_parts; }
 
 void check_options(const BoostOptions& options) {
   if (!(options.rate >= 0.0 && options.rate <= 1.0)) {
@@ -104,10 +109,11 @@ std::vector<int> units_of(const GivenRows& given, const std::vector<Eigen::Index
 // The part of each row; rows of one unit are in one part.
 std::vector<int> deal(const std::vector<int>& units, std::uint64_t seed) {
   const Eigen::Index count = *std::ranges::max_element(units) + 1;
-  if (count < num_parts) {
+  if (count < fewest_parts) {
     throw std::invalid_argument(
-        fmt::format("llmt::fit_boosted: there are {} groups of rows, at least {} are needed", count, num_parts));
+        fmt::format("llmt::fit_boosted: there are {} groups of rows, at least {} are needed", count, fewest_parts));
   }
+  const Eigen::Index num_parts = std::min(num_parts_of(std::ssize(units)), count);
   const std::vector<Eigen::Index> order = Random(seed).permutation(count);
   std::vector<int> part(count);
   for (Eigen::Index k = 0; k < count; ++k) part[order[k]] = static_cast<int>(k % num_parts);
@@ -117,7 +123,7 @@ std::vector<int> deal(const std::vector<int>& units, std::uint64_t seed) {
 }
 
 std::vector<HoldOut> hold_outs_of(const std::vector<int>& part) {
-  std::vector<HoldOut> result(std::ssize(part) < few_rows ? num_parts : 1);
+  std::vector<HoldOut> result(std::ssize(part) < few_rows ? fewest_parts : 1);
   for (int k = 0; k < std::ssize(result); ++k) {
     for (int row = 0; row < std::ssize(part); ++row) {
       (part[row] == k ? result[k].held_out : result[k].train).push_back(row);
@@ -135,6 +141,28 @@ HoldOut given_hold_out(const GivenRows& given, const std::vector<Eigen::Index>& 
     throw std::invalid_argument("llmt::fit_boosted: held_out has all rows that count, or none of them");
   }
   return result;
+}
+
+bool is_held_out(const BoostingData& data, const GivenRows& given, const DifferentRows& rows, Eigen::Index k) {
+  return data.is_hold_out_given ? given.held_out[rows.first[k]] : data.parts[k] == 0;
+}
+
+// Puts the rows in random order, so that any of them one after the other are a fair sample, and those that are held out
+// behind all others.
+void shuffle(DifferentRows& rows, BoostingData& data, const GivenRows& given, std::uint64_t seed) {
+  const std::vector<Eigen::Index> order = Random(seed).permutation(std::ssize(rows.first));
+  DifferentRows ordered;
+  std::vector<int> parts;
+  for (const bool held_out : {false, true}) {
+    for (const Eigen::Index k : order) {
+      if (is_held_out(data, given, rows, k) != held_out) continue;
+      ordered.first.push_back(rows.first[k]);
+      ordered.weights.push_back(rows.weights[k]);
+      if (!data.parts.empty()) parts.push_back(data.parts[k]);
+    }
+  }
+  rows = std::move(ordered);
+  data.parts = std::move(parts);
 }
 
 InputColumn describe(const TrainingData& data, const GivenRows& given, const BoostingData& result, Eigen::Index input,
@@ -220,7 +248,7 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
   const GivenRows given = checked_rows(data, options);
   const std::vector<Eigen::Index> rows = weighted_rows(given);
   const RowNumbers numbers = number_rows(given.inputs.values, given.outputs.values, rows, options.max_threads);
-  const DifferentRows different = different_rows(given, numbers, rows);
+  DifferentRows different = different_rows(given, numbers, rows);
   const bool few = std::ssize(different.first) < fewest_boosted_rows;
   if (few && !options.mean_of_few) {
     throw std::invalid_argument(
@@ -232,6 +260,9 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
                                             different.first.size(), most_boosted_rows));
   }
   BoostingData result;
+  result.is_hold_out_given = !given.held_out.empty();
+  if (!few && !result.is_hold_out_given) result.parts = deal(units_of(given, different.first), options.seed);
+  if (std::ssize(different.first) > many_rows) shuffle(different, result, given, options.seed);
   result.x = given.inputs.values(different.first, Eigen::all);
   result.y = given.outputs.values(different.first, Eigen::all);
   result.rows.weights = Eigen::Map<const Eigen::VectorXd>(different.weights.data(), std::ssize(different.weights));
@@ -241,8 +272,6 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
     describe_columns(data, given, result);
     return result;
   }
-  result.is_hold_out_given = !given.held_out.empty();
-  if (!result.is_hold_out_given) result.parts = deal(units_of(given, different.first), options.seed);
   result.hold_outs = result.is_hold_out_given ? std::vector<HoldOut>{given_hold_out(given, different.first)}
                                               : hold_outs_of(result.parts);
   describe_columns(data, given, result);

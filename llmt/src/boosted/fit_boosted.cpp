@@ -15,9 +15,12 @@ namespace {
 // docs/algorithms/boosting.md says on which tables these were chosen.
 constexpr Eigen::Index enough_for_races = 5000;
 constexpr Eigen::Index enough_for_fast = 10000;
+constexpr Eigen::Index enough_for_faster = 100001;
 constexpr int race_rounds = 50;
 constexpr Eigen::Index most_raced = 10000;  // rows that trees of the race learn from, or
-constexpr Eigen::Index raced_part = 4;      // a quarter of the rows, if that is more
+constexpr Eigen::Index raced_part = 4;      // a quarter of the rows, if that is more,
+constexpr Eigen::Index most_of_many_raced = 100000;
+constexpr Eigen::Index refitted_part = 20;  // the sum is fitted to all rows if more than this part was held out
 constexpr int patience_of_few = 200;        // below enough_for_races, whose few held-out rows err,
 constexpr int patience_of_folds = 100;      // and where every row is held out once
 constexpr double race_rate = 0.3;
@@ -108,7 +111,7 @@ class OutputFit {
     if (data_.hold_outs.empty()) return mean_alone(summary);
     const Eigen::Index rows = y_.size();
     rounds_.tree = usual_trees(rows);
-    rounds_.rate = rows < enough_for_fast ? 0.05 : 0.07;
+    rounds_.rate = rows < enough_for_fast ? 0.05 : rows < enough_for_faster ? 0.07 : 0.1;
     if (rows < enough_for_races) rounds_.patience = data_.hold_outs.size() > 1 ? patience_of_folds : patience_of_few;
     rounds_.max_threads = options_.max_threads;
     name_ = "symmetric";
@@ -142,7 +145,7 @@ class OutputFit {
     Random random(options_.seed);  // the same for all
     Work part(work, 0.25);
     const HoldOut& rows = data_.hold_outs.front();
-    const Eigen::Index most = std::max(most_raced, std::ssize(rows.train) / raced_part);
+    const Eigen::Index most = std::clamp(std::ssize(rows.train) / raced_part, most_raced, most_of_many_raced);
     Rounds result = boost(data_.rows, y_, some_of(rows.train, most), rows.held_out, {}, few, random, part);
     summary.compared.push_back({name, result.rmse * scale_});
     return result;
@@ -201,7 +204,8 @@ class OutputFit {
   std::vector<SumPart> finish(BoostSummary& summary, Work& work) {
     const HoldOut& rows = data_.hold_outs.front();
     SumPart sum{.rate = rounds_.rate, .rounds = {}};
-    Work stopping(work, (data_.is_hold_out_given ? 1.0 : 0.4) * work.left());
+    const bool is_refitted = !data_.is_hold_out_given && refitted_part * std::ssize(rows.held_out) > y_.size();
+    Work stopping(work, (is_refitted ? 0.4 : 1.0) * work.left());
     sum.rounds = boost(data_.rows, y_, rows.train, rows.held_out, {}, rounds_, random_, stopping);
     summary.rmse = sum.rounds.rmse * scale_;
     summary.held_out = std::ssize(rows.held_out);
@@ -210,7 +214,7 @@ class OutputFit {
     const bool is_tree_tried =
         y_.size() < enough_for_races || (y_.size() < most_rows_for_one && data_.x.cols() <= most_inputs_for_one &&
                                          sum.rounds.trees.size() <= most_trees_for_one);
-    if (!data_.is_hold_out_given) {
+    if (is_refitted) {
       summary.rows = y_.size();
       std::vector<int> all(y_.size());
       std::iota(all.begin(), all.end(), 0);

@@ -7,7 +7,9 @@
 #include <type_traits>
 
 #include "base/parallel.hpp"
+#include "base/sum_over.hpp"
 #include "boosted/growing_tree.hpp"
+#include "boosted/leaf_model.hpp"
 #include "boosted/model/transition.hpp"
 
 namespace llmt {
@@ -40,39 +42,6 @@ void visit(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row, in
 bool is_soft(const GrowingTree& tree) {
   return std::ranges::any_of(tree, [](const GrowingNode& node) { return node.half_width > 0.0; });
 }
-
-using Slopes = std::array<double, most_boosted_slopes>;
-using SquareOfSlopes = std::array<Slopes, most_boosted_slopes>;
-
-// Solves the positive definite system a x = b in place of b (Cholesky).
-void solve(SquareOfSlopes& a, Slopes& b, int size) {
-  for (int j = 0; j < size; ++j) {
-    for (int k = 0; k < j; ++k) {
-      for (int i = j; i < size; ++i) a[i][j] -= a[i][k] * a[j][k];
-    }
-    const double root = std::sqrt(std::max(a[j][j], 1e-12));
-    for (int i = j; i < size; ++i) a[i][j] /= root;
-  }
-  for (int i = 0; i < size; ++i) {
-    for (int k = 0; k < i; ++k) b[i] -= a[i][k] * b[k];
-    b[i] /= a[i][i];
-  }
-  for (int i = size - 1; i >= 0; --i) {
-    for (int k = i + 1; k < size; ++k) b[i] -= a[k][i] * b[k];
-    b[i] /= a[i][i];
-  }
-}
-
-// Over the rows of a leaf, e the residual of its path's model and z its regressors.
-struct RegressorSums {
-  double n = 0.0;                                        // of weights w
-  double s = 0.0;                                        // of w e
-  double low = std::numeric_limits<double>::infinity();  // of the outputs of rows that are mostly in the leaf
-  double high = -std::numeric_limits<double>::infinity();
-  Slopes z = {};           // of w z
-  Slopes ze = {};          // of w z e
-  SquareOfSlopes zz = {};  // of w z z'
-};
 
 // The compiler knows the number of slopes and unrolls the loops over them.
 template <int size, bool is_soft, bool is_weighted>
@@ -123,11 +92,10 @@ auto with_size(int size, const Of& of) {
 
 }  // namespace
 
-// beta += (Z'Z + ridge I)^-1 Z'e about the path's model, all centred in the leaf.
 void TreeGrower::fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::span<const double> shares,
                           const Eigen::VectorXd& residuals) const {
   const int size = static_cast<int>(leaf.model.features.size());
-  auto [n, s, low, high, mean, ze, zz] = with_size<most_boosted_slopes>(size, [&](auto fixed) {
+  const RegressorSums leaf_sums = with_size<most_boosted_slopes>(size, [&](auto fixed) {
     const auto sums = [&](auto is_soft, auto is_weighted) {
       return regressor_sums<fixed(), is_soft(), is_weighted()>(leaf.model, rows_, rows, shares, residuals);
     };
@@ -136,25 +104,13 @@ void TreeGrower::fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::spa
     if (rows_.equal_weights) return shares.empty() ? sums(false_type(), false_type()) : sums(true_type(), false_type());
     return shares.empty() ? sums(false_type(), true_type()) : sums(true_type(), true_type());
   });
-  for (int j = 0; j < size; ++j) mean[j] /= n;
-  for (int j = 0; j < size; ++j) {
-    ze[j] -= mean[j] * s;
-    for (int i = j; i < size; ++i) zz[i][j] -= n * mean[i] * mean[j];
-    zz[j][j] += options_.ridges.slope;
-  }
-  solve(zz, ze, size);
-  const double constant = s / (n + options_.ridges.constant);
-  leaf.model.constant += constant;
-  double middle = leaf.model.constant;
-  for (int j = 0; j < size; ++j) {
-    leaf.model.constant -= ze[j] * mean[j];
-    leaf.model.slopes[j] += ze[j];
-  }
-  for (int j = 0; j < size; ++j) middle += (leaf.model.slopes[j] - ze[j]) * mean[j];
-  if (low > high) low = high = middle;
-  const double margin = 0.1 * (high - low);
-  leaf.low = std::min(low - margin, middle);
-  leaf.high = std::max(high + margin, middle);
+  LeafModel model{.constant = leaf.model.constant};
+  std::copy_n(leaf.model.slopes.begin(), size, model.slopes.begin());
+  add_estimate(model, size, leaf_sums, options_.ridges);
+  leaf.model.constant = model.constant;
+  for (int j = 0; j < size; ++j) leaf.model.slopes[j] = model.slopes[j];
+  leaf.low = model.low;
+  leaf.high = model.high;
 }
 
 // A leaf without rows keeps its path's model within the range of the rows of the nearest node above.
@@ -200,6 +156,12 @@ void TreeGrower::subtract_last(const GrowingTree& tree, double rate, Eigen::Vect
   };
   // A row is in one leaf of a crisp tree, and may be in several of a soft one.
   parallel_for(std::ssize(tree), is_soft_ ? 1 : max_threads_, subtract);
+  const RowBlocks blocks{residuals.size() - count_};
+  parallel_for(blocks.count(), max_threads_, [&](Eigen::Index block) {
+    for (Eigen::Index k = blocks[block].begin; k < blocks[block].end; ++k) {
+      residuals(count_ + k) -= rate * value_at(tree, rows_, count_ + k);
+    }
+  });
 }
 
 double value_at(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row) {

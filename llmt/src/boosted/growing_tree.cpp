@@ -6,14 +6,16 @@
 #include <utility>
 
 #include "base/parallel.hpp"
+#include "boosted/leaf_model.hpp"
 
 namespace llmt {
 
-TreeGrower::TreeGrower(const BinnedRows& rows, std::vector<int> of_rows, TreeOptions options, int max_threads)
-    : rows_(rows), of_rows_(std::move(of_rows)), options_(options), max_threads_(max_threads) {}
+TreeGrower::TreeGrower(const BinnedRows& rows, Eigen::Index count, TreeOptions options, int max_threads)
+    : rows_(rows), count_(count), options_(options), max_threads_(max_threads) {}
 
 void TreeGrower::begin(const Eigen::VectorXd& residuals) {
-  order_ = of_rows_;
+  order_.resize(count_);
+  std::iota(order_.begin(), order_.end(), 0);
   residuals_.resize(order_.size());
   weights_.resize(order_.size());
   terms_.resize(order_.size());
@@ -62,22 +64,29 @@ RowsInOrder TreeGrower::rows_of(const GrowingNode& node) const {
           std::span(values_).subspan(node.begin, count)};
 }
 
-std::vector<int> TreeGrower::some_features(Random& random) const {
-  const Eigen::Index all = std::ssize(rows_.features);
-  const auto some = static_cast<Eigen::Index>(std::ceil(options_.columns * static_cast<double>(all)));
+std::vector<int> some_features(std::size_t all, double share, Random& random) {
+  const auto some = static_cast<std::size_t>(std::ceil(share * static_cast<double>(all)));
   std::vector<int> result;
-  for (const Eigen::Index feature : random.permutation(all)) {
-    if (std::ssize(result) < some) result.push_back(static_cast<int>(feature));
+  for (const Eigen::Index feature : random.permutation(static_cast<Eigen::Index>(all))) {
+    if (result.size() < some) result.push_back(static_cast<int>(feature));
   }
   std::ranges::sort(result);
   return result;
+}
+
+SplitChoice best_of_gains(const BinnedFeature& column, int feature, const Gains& gains, bool missing_left) {
+  SplitChoice best;
+  for (int t = 0; t + 1 < column.num_bins(); ++t) {
+    best.take_if_better({gains[t], feature, column.last_cells[t], missing_left});
+  }
+  return best;
 }
 
 bool TreeGrower::may_have_slope(const GrowingNode& node, int feature) const {
   return std::ssize(node.model.features) < options_.slopes || std::ranges::count(node.model.features, feature) > 0;
 }
 
-TreeGrower::Choice TreeGrower::best_of_features(std::span<const int> leaves, std::span<const int> features) const {
+SplitChoice TreeGrower::best_of_features(std::span<const int> leaves, std::span<const int> features) const {
   struct Column {
     const BinnedFeature* feature = nullptr;
     Gains gains;
@@ -108,31 +117,25 @@ TreeGrower::Choice TreeGrower::best_of_features(std::span<const int> leaves, std
       }
     }
   }
-  Choice best{0.0, -1, 0, false};
-  const auto look = [&](int feature, const Gains& of_side, bool missing_left) {
-    const BinnedFeature& column = rows_.features[feature];
-    for (int t = 0; t + 1 < column.num_bins(); ++t) {
-      if (of_side[t] > best.gain) best = {of_side[t], feature, column.last_cells[t], missing_left};
-    }
-  };
+  SplitChoice best;
   for (std::size_t k = 0; k < features.size(); ++k) {
-    look(features[k], columns[k].gains, false);
-    if (columns[k].feature->has_missing) look(features[k], columns[k].gains_missing_left, true);
+    const BinnedFeature& column = *columns[k].feature;
+    best.take_if_better(best_of_gains(column, features[k], columns[k].gains, false));
+    if (column.has_missing)
+      best.take_if_better(best_of_gains(column, features[k], columns[k].gains_missing_left, true));
   }
   return best;
 }
 
-TreeGrower::Choice TreeGrower::best_split(std::span<const int> leaves, const std::vector<int>& features) const {
-  std::vector<Choice> of_some((features.size() + features_at_once - 1) / features_at_once);
+SplitChoice TreeGrower::best_split(std::span<const int> leaves, const std::vector<int>& features) const {
+  std::vector<SplitChoice> of_some((features.size() + features_at_once - 1) / features_at_once);
   parallel_for(std::ssize(of_some), max_threads_, [&](Eigen::Index k) {
     const std::size_t first = k * features_at_once;
     const std::size_t count = std::min(features_at_once, features.size() - first);
     of_some[k] = best_of_features(leaves, std::span(features).subspan(first, count));
   });
-  Choice best{0.0, -1, 0, false};
-  for (const Choice& one : of_some) {
-    if (one.gain > best.gain) best = one;
-  }
+  SplitChoice best;
+  for (const SplitChoice& one : of_some) best.take_if_better(one);
   return best;
 }
 
@@ -168,10 +171,9 @@ void TreeGrower::split_rows(int index) {
 // The constant and the slope in the split's feature that the side's residuals ask for.
 void TreeGrower::add_to_path(GrowingNode& side, int feature) {
   const bool has_slope = may_have_slope(side, feature);
-  const auto [n, s, z, zz, ze] = sum_rows(rows_of(side));
-  if (n == 0.0) return;
-  const double slope = has_slope ? (ze - z * s / n) / (std::max(0.0, zz - z * z / n) + options_.ridges.slope) : 0.0;
-  const double constant = s / (n + options_.ridges.constant) - slope * z / n;
+  const SideSums sums = sum_rows(rows_of(side));
+  if (sums.weight == 0.0) return;
+  const auto [constant, slope] = side_model(sums, has_slope, options_.ridges);
   side.model.constant += constant;
   if (has_slope) {
     const auto found = std::ranges::find(side.model.features, feature);
@@ -187,7 +189,7 @@ void TreeGrower::add_to_path(GrowingNode& side, int feature) {
   if (is_searching_) pack(side);
 }
 
-void TreeGrower::split(std::span<const int> leaves, std::span<const Choice> choices) {
+void TreeGrower::split(std::span<const int> leaves, std::span<const SplitChoice> choices) {
   for (std::size_t k = 0; k < leaves.size(); ++k) {
     GrowingNode child;
     child.parent = leaves[k];
@@ -218,29 +220,31 @@ void TreeGrower::split(std::span<const int> leaves, std::span<const Choice> choi
 void TreeGrower::grow_symmetric(Random& random) {
   std::vector<int> leaves = {0};
   for (int level = 0; level < options_.depth; ++level) {
-    const Choice best = best_split(leaves, some_features(random));
+    const SplitChoice best = best_split(leaves, some_features(rows_.features.size(), options_.columns, random));
     is_searching_ = level + 1 < options_.depth;
     if (best.feature < 0) continue;
     std::vector<int> with_rows;
     for (const int leaf : leaves) {
       if (tree_[leaf].count() > 0) with_rows.push_back(leaf);
     }
-    split(with_rows, std::vector<Choice>(with_rows.size(), refined(with_rows, best)));
+    split(with_rows, std::vector<SplitChoice>(with_rows.size(), refined(with_rows, best)));
     leaves.clear();
     for (const int node : with_rows) leaves.insert(leaves.end(), {tree_[node].left, tree_[node].right});
   }
 }
 
 void TreeGrower::grow_free(Random& random) {
-  std::vector<Choice> best_of(1);
-  const auto look = [&](int leaf) { best_of[leaf] = best_split(std::vector<int>{leaf}, some_features(random)); };
+  std::vector<SplitChoice> best_of(1);
+  const auto look = [&](int leaf) {
+    best_of[leaf] = best_split(std::vector<int>{leaf}, some_features(rows_.features.size(), options_.columns, random));
+  };
   look(0);
   for (int leaves = 1; leaves < options_.leaves; ++leaves) {
-    const auto best = std::ranges::max_element(best_of, {}, &Choice::gain);
+    const auto best = std::ranges::max_element(best_of, {}, &SplitChoice::gain);
     if (best->feature < 0) return;
     const int leaf = static_cast<int>(best - best_of.begin());
-    split(std::vector<int>{leaf}, std::vector<Choice>{refined(std::vector<int>{leaf}, *best)});
-    best_of[leaf] = {0.0, -1, 0, false};
+    split(std::vector<int>{leaf}, std::vector<SplitChoice>{refined(std::vector<int>{leaf}, *best)});
+    best_of[leaf] = {};
     best_of.resize(tree_.size());
     if (leaves + 1 == options_.leaves) return;
     const GrowingNode& node = tree_[leaf];
@@ -269,7 +273,8 @@ GrowingTree TreeGrower::estimate(const GrowingTree& tree, const Eigen::VectorXd&
   std::vector<int> number(tree.size(), 0);
   for (std::size_t k = 0; k < tree.size(); ++k) {
     if (tree[k].feature < 0) continue;
-    split(std::vector<int>{number[k]}, std::vector<Choice>{{0.0, tree[k].feature, tree[k].cell, tree[k].missing_left}});
+    split(std::vector<int>{number[k]},
+          std::vector<SplitChoice>{{0.0, tree[k].feature, tree[k].cell, tree[k].missing_left}});
     const GrowingNode& node = tree_[number[k]];
     number[tree[k].left] = node.left;
     number[tree[k].right] = node.right;

@@ -57,15 +57,33 @@ struct GrowingNode {
 
 using GrowingTree = std::vector<GrowingNode>;
 
+/// A split of the rows of some leaves.
+struct SplitChoice {
+  double gain = 0.0;
+  int feature = -1;  ///< -1: none gains
+  int cell = 0;      ///< the last one of the left side
+  bool missing_left = false;
+
+  void take_if_better(const SplitChoice& other) {
+    if (other.gain > gain) *this = other;
+  }
+};
+
+/// The best threshold of a feature from the gains of all.
+SplitChoice best_of_gains(const BinnedFeature& column, int feature, const Gains& gains, bool missing_left);
+
+/// The features that a level, or a leaf of a free tree, looks at, in ascending order.
+std::vector<int> some_features(std::size_t all, double share, Random& random);
+
 /// A tree's prediction for a row of the fit.
 double value_at(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row);
 
 BoostedTree finished(const GrowingTree& tree, const BinnedRows& rows);
 
-/// Grows trees on some of the rows, or estimates the leaves of one that is there.
+/// Grows trees on the first `count` rows, or estimates the leaves of one that is there.
 class TreeGrower {
  public:
-  TreeGrower(const BinnedRows& rows, std::vector<int> of_rows, TreeOptions options, int max_threads);
+  TreeGrower(const BinnedRows& rows, Eigen::Index count, TreeOptions options, int max_threads);
 
   /// `residuals`: one for each row of the fit.
   GrowingTree grow(const Eigen::VectorXd& residuals, Random& random);
@@ -73,17 +91,10 @@ class TreeGrower {
   /// The tree with its splits, and leaves from these rows.
   GrowingTree estimate(const GrowingTree& tree, const Eigen::VectorXd& residuals);
 
-  /// residuals -= rate . tree in the grower's rows. `tree`: the last one of grow() or estimate().
+  /// residuals -= rate . tree in all rows. `tree`: the last one of grow() or estimate().
   void subtract_last(const GrowingTree& tree, double rate, Eigen::VectorXd& residuals) const;
 
  private:
-  struct Choice {
-    double gain = 0.0;
-    int feature = -1;
-    int cell = 0;  // the last one of the left side
-    bool missing_left = false;
-  };
-
   struct RowsInLeaf {
     std::span<const int> rows;
     std::span<const double> shares;  // empty: all 1
@@ -104,14 +115,13 @@ class TreeGrower {
 
   void begin(const Eigen::VectorXd& residuals);
   void pack(const GrowingNode& node);
-  std::vector<int> some_features(Random& random) const;
-  Choice best_of_features(std::span<const int> leaves, std::span<const int> features) const;
-  Choice best_split(std::span<const int> leaves, const std::vector<int>& features) const;
-  Choice refined(std::span<const int> leaves, Choice choice);
+  SplitChoice best_of_features(std::span<const int> leaves, std::span<const int> features) const;
+  SplitChoice best_split(std::span<const int> leaves, const std::vector<int>& features) const;
+  SplitChoice refined(std::span<const int> leaves, SplitChoice choice);
   void gather(const GrowingNode& node, int feature);
   RowsInOrder rows_of(const GrowingNode& node) const;
   bool may_have_slope(const GrowingNode& node, int feature) const;
-  void split(std::span<const int> leaves, std::span<const Choice> choices);
+  void split(std::span<const int> leaves, std::span<const SplitChoice> choices);
   void split_rows(int node);
   void add_to_path(GrowingNode& side, int feature);
   double half_width_of(int node) const;
@@ -127,7 +137,7 @@ class TreeGrower {
   void hold_empty(GrowingNode& leaf, const Eigen::VectorXd& residuals) const;
 
   const BinnedRows& rows_;
-  const std::vector<int> of_rows_;
+  const Eigen::Index count_;
   const TreeOptions options_;
   const int max_threads_;
   GrowingTree tree_;

@@ -22,6 +22,9 @@ struct SideSums {
     zz += w * of_z * of_z;
     ze += w * of_z * e;
   }
+  SideSums operator+(const SideSums& other) const {
+    return {weight + other.weight, residual + other.residual, z + other.z, zz + other.zz, ze + other.ze};
+  }
   SideSums operator-(const SideSums& other) const {
     return {weight - other.weight, residual - other.residual, z - other.z, zz - other.zz, ze - other.ze};
   }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "base/simd.hpp"
 #include "boosted/growing_tree.hpp"
@@ -126,10 +127,11 @@ bool TreeGrower::blends_well(int index, double half_width) const {
 // The same shares as visit(), node by node.
 void TreeGrower::share_rows() {
   if (soft_rows_.size() < tree_.size()) soft_rows_.resize(tree_.size());
-  soft_rows_[0].make_room(of_rows_.size());
-  std::ranges::copy(of_rows_, soft_rows_[0].rows.begin());
-  std::fill_n(soft_rows_[0].shares.begin(), of_rows_.size(), 1.0);
-  soft_rows_[0].count = of_rows_.size();
+  SoftRows& all = soft_rows_[0];
+  all.count = static_cast<std::size_t>(count_);
+  all.make_room(all.count);
+  std::iota(all.rows.begin(), all.rows.begin() + count_, 0);
+  std::fill_n(all.shares.begin(), count_, 1.0);
   for (std::size_t index = 0; index < tree_.size(); ++index) {
     if (tree_[index].feature >= 0) share_rows_of(static_cast<int>(index));
   }

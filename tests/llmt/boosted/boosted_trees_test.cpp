@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "boosted/growing_tree.hpp"
+#include "boosted/symmetric_grower.hpp"
 #include "llmt/boosted/some_rows.hpp"
 #include "oracles/boosted_formula.hpp"
 
@@ -211,6 +212,14 @@ void expect_ridges(const llmt::GrowingTree& tree, const Rows& rows, int index, c
   }
 }
 
+// By the grower that boosting takes.
+llmt::GrowingTree grown(const Rows& rows, const llmt::TreeOptions& options, const Eigen::VectorXd& y) {
+  llmt::Random random(1);
+  const Eigen::Index count = std::ssize(rows.all);
+  if (options.symmetric) return llmt::SymmetricGrower(rows.binned, count, options, 1).grow(y, random);
+  return llmt::TreeGrower(rows.binned, count, options, 1).grow(y, random);
+}
+
 TEST(BoostedTree, HasInItsLeavesRidgeAboutTheirPath) {
   for (const bool symmetric : {true, false}) {
     const Rows rows = some_rows(400, 3, true, 0.0, 5);
@@ -219,12 +228,55 @@ TEST(BoostedTree, HasInItsLeavesRidgeAboutTheirPath) {
     options.depth = 3;
     options.leaves = 7;
     options.columns = 1.0;
-    llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
-    llmt::Random random(1);
-    const llmt::GrowingTree tree = grower.grow(rows.y, random);
+    const llmt::GrowingTree tree = grown(rows, options, rows.y);
     EXPECT_GT(tree.size(), 8U);
     const Path root{rows.binned.weights.dot(rows.y) / rows.binned.weights.sum(), Eigen::VectorXd::Zero(3)};
     expect_ridges(tree, rows, 0, rows.all, root, options.ridges);
+  }
+}
+
+// Two programs for one tree: the rows stay in their order, or those of a node are put together.
+TEST(BoostedTree, OfSymmetricSplitsIsTheSameFromBothGrowers) {
+  for (const bool weighted : {false, true}) {
+    for (const double missing_share : {0.0, 0.2}) {
+      for (const int slopes : {3, 5, 8}) {
+        const Rows rows = some_rows(3000, 7, weighted, missing_share, 9);
+        llmt::TreeOptions options;
+        options.slopes = slopes;
+        const Eigen::Index count = 2500;  // the others are held out
+        llmt::TreeGrower by_node(rows.binned, count, options, 1);
+        llmt::SymmetricGrower in_order(rows.binned, count, options, 2);
+        llmt::Random random(5);
+        llmt::Random same_random(5);
+        const llmt::GrowingTree expected = by_node.grow(rows.y, random);
+        const llmt::GrowingTree tree = in_order.grow(rows.y, same_random);
+        ASSERT_GT(tree.size(), 60U);
+        std::vector<double> splits;
+        std::vector<double> expected_splits;
+        for (const llmt::GrowingNode& node : tree)
+          splits.push_back(node.feature < 0 ? -1.0 : node.feature + 1e-5 * node.cell);
+        for (const llmt::GrowingNode& node : expected) {
+          expected_splits.push_back(node.feature < 0 ? -1.0 : node.feature + 1e-5 * node.cell);
+        }
+        std::ranges::sort(splits);
+        std::ranges::sort(expected_splits);
+        EXPECT_EQ(splits, expected_splits);
+        Eigen::VectorXd left = rows.y;
+        Eigen::VectorXd expected_left = rows.y;
+        in_order.subtract_last(tree, 0.3, left);
+        by_node.subtract_last(expected, 0.3, expected_left);
+        EXPECT_LT((left - expected_left).cwiseAbs().maxCoeff(), 1e-9);
+        for (const int row : rows.all) {
+          EXPECT_NEAR(left(row), rows.y(row) - 0.3 * llmt::value_at(tree, rows.binned, row), 1e-12);
+        }
+        const Eigen::VectorXd other = rows.y.reverse();
+        const llmt::GrowingTree again = in_order.estimate(tree, other);
+        const llmt::GrowingTree expected_again = by_node.estimate(expected, other);
+        for (const int row : rows.all) {
+          EXPECT_NEAR(llmt::value_at(again, rows.binned, row), llmt::value_at(expected_again, rows.binned, row), 1e-9);
+        }
+      }
+    }
   }
 }
 
@@ -247,9 +299,7 @@ TEST(BoostedTree, SplitsInsideOfABin) {
       options.depth = 1;
       options.leaves = 2;
       options.columns = 1.0;
-      llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
-      llmt::Random random(1);
-      const llmt::GrowingTree tree = grower.grow(y, random);
+      const llmt::GrowingTree tree = grown(rows, options, y);
       ASSERT_EQ(tree.front().feature, 0);
       EXPECT_EQ(rows.binned.features[0].edges[tree.front().cell], below + (above - below) / 2.0);
     }
@@ -261,9 +311,7 @@ TEST(BoostedTree, OfOneLeafIsTheMean) {
   const Rows rows = some_rows(100, 2, true, 0.0, 6);
   llmt::TreeOptions options;
   options.depth = 0;
-  llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
-  llmt::Random random(1);
-  const llmt::GrowingTree tree = grower.grow(rows.y, random);
+  const llmt::GrowingTree tree = grown(rows, options, rows.y);
   ASSERT_EQ(tree.size(), 1U);
   const double mean = rows.binned.weights.dot(rows.y) / rows.binned.weights.sum();
   for (const int row : rows.all) EXPECT_NEAR(llmt::value_at(tree, rows.binned, row), mean, 1e-12);
@@ -276,7 +324,7 @@ TEST(BoostedTree, IsTheSameWhenItsLeavesAreEstimatedAnew) {
     llmt::TreeOptions options;
     options.depth = 4;
     options.softness = softness;
-    llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
+    llmt::TreeGrower grower(rows.binned, std::ssize(rows.all), options, 1);
     llmt::Random random(3);
     const llmt::GrowingTree grown = grower.grow(rows.y, random);
     const llmt::GrowingTree again = grower.estimate(grown, rows.y);
@@ -300,7 +348,7 @@ TEST(BoostedTree, OfSoftSplitsBlendsTheSidesOfARow) {
     options.softness = 0.6;
     options.depth = depth;
     options.columns = 1.0;
-    llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
+    llmt::TreeGrower grower(rows.binned, std::ssize(rows.all), options, 1);
     llmt::Random random(1);
     const llmt::GrowingTree tree = grower.grow(smooth, random);
     const llmt::BoostedTree done = llmt::finished(tree, rows.binned);
