@@ -106,9 +106,9 @@ BinnedFeature bin_feature(BoostedFeature feature, const Eigen::VectorXd& values,
   result.has_missing = std::ssize(rows) < values.size();
   result.cells.assign(values.size(), missing_cell);
   std::size_t cell = 0;
-  for (const auto [value, row] : rows) {
-    while (cell < result.edges.size() && result.edges[cell] < value) ++cell;
-    result.cells[row] = static_cast<std::uint16_t>(cell);
+  for (const RowOfValue& one : rows) {
+    while (cell < result.edges.size() && result.edges[cell] < one.value) ++cell;
+    result.cells[one.row] = static_cast<std::uint16_t>(cell);
   }
   result.bins.resize(values.size());
   result.values.resize(values.size());

@@ -3,13 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "base/checks.hpp"
 #include "base/parallel.hpp"
 #include "base/sum_over.hpp"
 #include "boosted/model/boosted_checks.hpp"
+#include "boosted/model/symmetric_table.hpp"
 #include "boosted/model/transition.hpp"
 
 namespace llmt {
@@ -50,6 +53,52 @@ void check_rows(const char* function, const BoostedModel& model, const Eigen::Re
         fmt::format("{}: inputs has {} columns, the model has {} inputs", function, inputs.cols(), model.num_inputs()));
   }
   check_finite_or_missing(function, "inputs", inputs);
+}
+
+// With fewer rows a table takes longer to make than it saves.
+constexpr Eigen::Index enough_for_tables = 256;
+
+std::vector<std::optional<SymmetricTable>> tables_of(const BoostedSum& sum, Eigen::Index rows) {
+  std::vector<std::optional<SymmetricTable>> tables(sum.trees.size());
+  if (rows < enough_for_tables) return tables;
+  for (std::size_t k = 0; k < tables.size(); ++k) tables[k] = symmetric_table(sum.trees[k]);
+  return tables;
+}
+
+void predict_by(const BoostedModel& model, const BoostedSum& sum, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                int max_threads, Eigen::Ref<Eigen::VectorXd> result) {
+  const std::vector<std::optional<SymmetricTable>> tables = tables_of(sum, inputs.rows());
+  const bool has_tables = std::ranges::any_of(tables, [](const auto& table) { return table.has_value(); });
+  const RowBlocks blocks{inputs.rows(), rows_at_once};
+  parallel_for(blocks.count(), max_threads, [&](Eigen::Index block) {
+    const auto [begin, end] = blocks[block];
+    const Eigen::Index count = end - begin;
+    std::vector<double> x(model.num_inputs());
+    Eigen::MatrixXd z(std::ssize(sum.features), count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      Eigen::Map<Eigen::VectorXd>(x.data(), model.num_inputs()) = inputs.row(begin + i);
+      for (Eigen::Index k = 0; k < z.rows(); ++k) {
+        z(k, i) = feature_at(sum.features[k], model.inputs(), model.deviations(), x.data());
+      }
+    }
+    Eigen::MatrixXd columns;  // the same, feature by feature
+    Eigen::MatrixXd in_slopes;
+    if (has_tables) {
+      columns.setZero(rows_at_once, z.rows());
+      columns.topRows(count) = z.transpose();
+      in_slopes = columns.array().isNaN().select(0.0, columns);
+    }
+    // Tree by tree, so that a tree stays in the cache for the rows of the block.
+    std::array<double, rows_at_once> values = {};
+    for (std::size_t k = 0; k < sum.trees.size(); ++k) {
+      if (tables[k]) {
+        add_values(*tables[k], columns.data(), in_slopes.data(), values.data());
+      } else {
+        for (Eigen::Index i = 0; i < count; ++i) values[i] += value_of(sum.trees[k], z.col(i).data());
+      }
+    }
+    for (Eigen::Index i = 0; i < count; ++i) result(begin + i) = sum.base + sum.rate * values[i];
+  });
 }
 
 }  // namespace
@@ -126,29 +175,7 @@ std::vector<double> distance_outside(const BoostedModel& model, const Eigen::Ref
 Eigen::MatrixXd BoostedModel::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads) const {
   check_rows("llmt::BoostedModel::predict", *this, inputs);
   Eigen::MatrixXd result(inputs.rows(), num_outputs());
-  constexpr Eigen::Index rows_at_once = 64;
-  const RowBlocks blocks{inputs.rows(), rows_at_once};
-  parallel_for(blocks.count(), max_threads, [&](Eigen::Index block) {
-    const auto [begin, end] = blocks[block];
-    std::vector<double> x(num_inputs());
-    for (std::size_t o = 0; o < sums_.size(); ++o) {
-      const BoostedSum& sum = sums_[o];
-      const std::size_t width = sum.features.size();
-      std::vector<double> z(width * (end - begin));
-      std::vector<double> values(end - begin, 0.0);
-      for (Eigen::Index row = begin; row < end; ++row) {
-        Eigen::Map<Eigen::VectorXd>(x.data(), num_inputs()) = inputs.row(row);
-        for (std::size_t k = 0; k < width; ++k) {
-          z[(row - begin) * width + k] = feature_at(sum.features[k], inputs_, deviations_, x.data());
-        }
-      }
-      // Tree by tree, so that a tree stays in the cache for the rows of the block.
-      for (const BoostedTree& tree : sum.trees) {
-        for (std::size_t i = 0; i < values.size(); ++i) values[i] += value_of(tree, &z[i * width]);
-      }
-      for (Eigen::Index row = begin; row < end; ++row) result(row, o) = sum.base + sum.rate * values[row - begin];
-    }
-  });
+  for (Eigen::Index o = 0; o < num_outputs(); ++o) predict_by(*this, sums_[o], inputs, max_threads, result.col(o));
   return result;
 }
 
