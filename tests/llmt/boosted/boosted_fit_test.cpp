@@ -63,26 +63,6 @@ TEST(BoostedModel, PredictsTheSumOfItsTreesToTheBit) {
   }
 }
 
-// Many rows are predicted by tables of symmetric trees, few by their splits; soft trees have no table.
-TEST(BoostedModel, PredictsARowAloneAsAmongManyToTheBit) {
-  for (const bool is_soft : {false, true}) {
-    llmt::BoostedModel model = llmt::fit_boosted(mixed(600), {.max_rounds = 30}).model;
-    if (is_soft) {
-      std::vector<llmt::BoostedSum> sums = model.sums();
-      for (llmt::BoostedSum& sum : sums) {
-        sum.trees.front().splits.front().half_width = 0.5;
-        sum.trees[1].splits.back().threshold += 0.25;  // no longer that of its level
-      }
-      model = {model.inputs(), model.outputs(), model.deviations(), sums};
-    }
-    const llmt::TrainingData rows = mixed(1000);
-    const Eigen::MatrixXd predicted = model.predict(rows.inputs);
-    for (Eigen::Index i = 0; i < rows.inputs.rows(); ++i) {
-      EXPECT_EQ(model.predict(rows.inputs.row(i)), predicted.row(i));
-    }
-  }
-}
-
 TEST(BoostedModel, BlendsTheSidesOfSoftSplits) {
   const llmt::BoostedModel model = random_boosted::model({.soft = true}, 1);
   const Eigen::MatrixXd inputs = random_boosted::rows(200, 1);

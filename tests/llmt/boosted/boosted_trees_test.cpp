@@ -235,51 +235,6 @@ TEST(BoostedTree, HasInItsLeavesRidgeAboutTheirPath) {
   }
 }
 
-// Two programs for one tree: the rows stay in their order, or those of a node are put together.
-TEST(BoostedTree, OfSymmetricSplitsIsTheSameFromBothGrowers) {
-  for (const bool weighted : {false, true}) {
-    for (const double missing_share : {0.0, 0.2}) {
-      for (const int slopes : {3, 5, 8}) {
-        const Rows rows = some_rows(3000, 7, weighted, missing_share, 9);
-        llmt::TreeOptions options;
-        options.slopes = slopes;
-        const Eigen::Index count = 2500;  // the others are held out
-        llmt::TreeGrower by_node(rows.binned, count, options, 1);
-        llmt::SymmetricGrower in_order(rows.binned, count, options, 2);
-        llmt::Random random(5);
-        llmt::Random same_random(5);
-        const llmt::GrowingTree expected = by_node.grow(rows.y, random);
-        const llmt::GrowingTree tree = in_order.grow(rows.y, same_random);
-        ASSERT_GT(tree.size(), 60U);
-        std::vector<double> splits;
-        std::vector<double> expected_splits;
-        for (const llmt::GrowingNode& node : tree)
-          splits.push_back(node.feature < 0 ? -1.0 : node.feature + 1e-5 * node.cell);
-        for (const llmt::GrowingNode& node : expected) {
-          expected_splits.push_back(node.feature < 0 ? -1.0 : node.feature + 1e-5 * node.cell);
-        }
-        std::ranges::sort(splits);
-        std::ranges::sort(expected_splits);
-        EXPECT_EQ(splits, expected_splits);
-        Eigen::VectorXd left = rows.y;
-        Eigen::VectorXd expected_left = rows.y;
-        in_order.subtract_last(tree, 0.3, left);
-        by_node.subtract_last(expected, 0.3, expected_left);
-        EXPECT_LT((left - expected_left).cwiseAbs().maxCoeff(), 1e-9);
-        for (const int row : rows.all) {
-          EXPECT_NEAR(left(row), rows.y(row) - 0.3 * llmt::value_at(tree, rows.binned, row), 1e-12);
-        }
-        const Eigen::VectorXd other = rows.y.reverse();
-        const llmt::GrowingTree again = in_order.estimate(tree, other);
-        const llmt::GrowingTree expected_again = by_node.estimate(expected, other);
-        for (const int row : rows.all) {
-          EXPECT_NEAR(llmt::value_at(again, rows.binned, row), llmt::value_at(expected_again, rows.binned, row), 1e-9);
-        }
-      }
-    }
-  }
-}
-
 // A step between two values of a bin: the split is between these values.
 TEST(BoostedTree, SplitsInsideOfABin) {
   for (const bool symmetric : {true, false}) {
