@@ -149,7 +149,7 @@ void add_boosted(nb::module_& module) {
         return report::boosted_inspection_text(self, name, width);
       });
   nb::class_<BoostResult>(module, "BoostFit", "A boosted fit with all that reports need of it.")
-      .def("model", [](const BoostResult& self) { return to_json(self.model); })
+      .def("model", [](const BoostResult& self) { return self.model; })
       .def("summary",
            [](const BoostResult& self, const std::string& data) {
              return report::boosted_json({.data = data, .output = ""}, self).dump();

@@ -104,7 +104,7 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
                 held_out=rows.held_out,
                 report=bar,
             )
-        self.model_ = BoostedModel(fitted.model())
+        self.model_ = BoostedModel.of_handle(fitted.model())
         self.summary_ = json.loads(fitted.summary("table"))
         self._fit = fitted
         if self.summary_["sums"][0]["variant"] == "mean":

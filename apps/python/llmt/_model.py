@@ -29,11 +29,19 @@ class TextModel:
     _type: ClassVar[Any]
 
     def __init__(self, text: str) -> None:
-        self._text = text
+        self._text: str | None = text
         self._handle: Any = self._type(text)
 
+    @classmethod
+    def of_handle(cls, handle: Any) -> "Self":
+        """A model that is a C++ object already. Its text, which may be long, is written when it is asked for."""
+        model = cls.__new__(cls)
+        model._text = None
+        model._handle = handle
+        return model
+
     def __getstate__(self) -> dict[str, str]:
-        return {"text": self._text}
+        return {"text": self._whole_text()}
 
     def __setstate__(self, state: dict[str, str]) -> None:
         self._text = state["text"]
@@ -46,18 +54,23 @@ class TextModel:
             self._handle = self._type(self._text)
         return self._handle
 
+    def _whole_text(self) -> str:
+        if self._text is None:
+            self._text = self._handle.to_json()
+        return self._text
+
     def to_json(self) -> str:
         """The model as JSON text."""
-        return self._text
+        return self._whole_text()
 
     def to_dict(self) -> dict[str, Any]:
         """The members of the JSON text."""
-        parsed: dict[str, Any] = json.loads(self._text)
+        parsed: dict[str, Any] = json.loads(self._whole_text())
         return parsed
 
     def save(self, path: "str | os.PathLike[str]") -> None:
         """Writes the file that `llmt predict` reads. A failed write leaves an old file as it was."""
-        write_text(path, self._text)
+        write_text(path, self._whole_text())
 
     @classmethod
     def load(cls, path: "str | os.PathLike[str]") -> "Self":
@@ -81,7 +94,7 @@ class Model(TextModel):
 
     def to_json(self, intervals: bool = True) -> str:
         """The model as JSON text; `intervals`: with what prediction intervals need."""
-        text: str = self._text if intervals else self.handle.without_intervals()
+        text: str = self._whole_text() if intervals else self.handle.without_intervals()
         return text
 
     def to_dict(self) -> dict[str, Any]:

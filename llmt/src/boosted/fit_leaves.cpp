@@ -81,6 +81,26 @@ RegressorSums regressor_sums(const PathModel& model, const BinnedRows& all, std:
   return sums;
 }
 
+// PathModel::at() with a number of slopes that the compiler knows.
+template <int size>
+struct PathValues {
+  PathValues(const PathModel& model, const BinnedRows& rows) : constant(model.constant) {
+    for (int j = 0; j < size; ++j) {
+      slopes[j] = model.slopes[j];
+      values[j] = rows.features[model.features[j]].values.data();
+    }
+  }
+  double at(Eigen::Index row) const {
+    double value = constant;
+    for (int j = 0; j < size; ++j) value += slopes[j] * static_cast<double>(values[j][row]);
+    return value;
+  }
+
+  double constant;
+  std::array<double, size> slopes;
+  std::array<const float*, size> values;
+};
+
 // Calls of(size) with the size, up to `most`, as a constant.
 template <int most, class Of>
 auto with_size(int size, const Of& of) {
@@ -149,10 +169,13 @@ void TreeGrower::subtract_last(const GrowingTree& tree, double rate, Eigen::Vect
     if (tree[k].feature >= 0) return;
     const GrowingNode& leaf = tree[k];
     const auto [rows, shares] = rows_in(tree, static_cast<int>(k));
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const double value = std::clamp(leaf.model.at(rows_, rows[i]), leaf.low, leaf.high);
-      residuals(rows[i]) -= rate * (shares.empty() ? value : shares[i] * value);
-    }
+    with_size<most_boosted_slopes>(static_cast<int>(leaf.model.features.size()), [&](auto size) {
+      const PathValues<size()> model(leaf.model, rows_);
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        const double value = std::clamp(model.at(rows[i]), leaf.low, leaf.high);
+        residuals(rows[i]) -= rate * (shares.empty() ? value : shares[i] * value);
+      }
+    });
   };
   // A row is in one leaf of a crisp tree, and may be in several of a soft one.
   parallel_for(std::ssize(tree), is_soft_ ? 1 : max_threads_, subtract);

@@ -34,6 +34,14 @@ void look_up(std::span<const int> rows, const GrowingNode& node, const BinnedFea
   }
 }
 
+// The same of rows that the split has just put in order, `in_left` of them on the left side. None lacks a value.
+void look_up(std::span<const float> values, std::ptrdiff_t in_left, Numbers& z, Numbers& is_right) {
+  std::ranges::copy(values, z.begin());
+  const auto first_right = is_right.begin() + std::clamp<std::ptrdiff_t>(in_left, 0, std::ssize(values));
+  std::fill(is_right.begin(), first_right, 0.0);
+  std::fill(first_right, is_right.begin() + std::ssize(values), 1.0);
+}
+
 // Splits the shares of rows. Choices in place of branches, which no processor could foresee.
 LLMT_FOR_EACH_INSTRUCTION_SET
 void split_shares(std::size_t count, double threshold, double half_width, const double* z, const double* is_right,
@@ -115,7 +123,11 @@ bool TreeGrower::blends_well(int index, double half_width) const {
   Squares sums;
   for (Eigen::Index k = node.begin; k < node.end; k += most_rows) {
     const std::size_t count = std::min<std::size_t>(most_rows, node.end - k);
-    look_up(std::span(order_).subspan(k, count), node, column, z, is_right);
+    if (column.has_missing) {
+      look_up(std::span(order_).subspan(k, count), node, column, z, is_right);
+    } else {
+      look_up(std::span(values_).subspan(k, count), tree_[node.right].begin - k, z, is_right);
+    }
     const Squares some = squares_of(count, column.edges[node.cell], half_width, constant, slope, z.data(),
                                     is_right.data(), &residuals_[k], &weights_[k]);
     sums.crisp += some.crisp;
