@@ -11,8 +11,9 @@ cut goes on where it stopped. To measure anew, delete the file, or the lines of 
 
 A fit is a process of its own, forked when the packages are imported and ChimeraBoost is compiled. Its CPU seconds go
 from arrays in memory to the model, and its MiB are what the process grows by. Those of the programs llmt and M5P include
-reading the table and writing the model, and their MiB are all that the program has, but at least the size of this
-script's process, of which they are forked.
+reading the table and writing the model, those of prediction (`predict_cpu` of a line) reading the table and the model
+and writing text. Their MiB are all that the program has, but at least the size of this script's process, of which they
+are forked.
 """
 import argparse
 import importlib.metadata
@@ -93,6 +94,10 @@ def data_of_function(options):
     return [(SYNTHETIC + count, 0, lambda count=count: rows(int(float(count)))) for count in options.rows.split(",")]
 
 
+def cpu_between(before, after):
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
 def work(make, seed, data, seconds, sender):
     """In the process of a fit: sends its result."""
     import numpy as np
@@ -108,9 +113,9 @@ def work(make, seed, data, seconds, sender):
         before = resource.getrusage(clock)
         model.fit(train_x, train_y)
         after = resource.getrusage(clock)
-        result = {"fit_cpu": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
-                  "fit_mib": (after.ru_maxrss - before.ru_maxrss) / 1024}
+        result = {"fit_cpu": cpu_between(before, after), "fit_mib": (after.ru_maxrss - before.ru_maxrss) / 1024}
         predicted = np.asarray(model.predict(test_x)).ravel()
+        result["predict_cpu"] = cpu_between(after, resource.getrusage(clock))
         result["rmse"] = float(np.sqrt(np.mean((predicted - test_y)**2)))
         result["r2"] = 1 - result["rmse"]**2 / float(np.var(test_y))
         if not math.isfinite(result["rmse"]):
