@@ -14,7 +14,7 @@
 
 namespace llmt {
 
-/// Leaves of a symmetric tree of the largest depth.
+/// The largest TreeOptions::depth, and the leaves of such a tree.
 inline constexpr int most_symmetric_depth = 6;
 inline constexpr int most_symmetric_leaves = 1 << most_symmetric_depth;
 
