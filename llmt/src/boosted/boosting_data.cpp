@@ -25,9 +25,7 @@ constexpr double largest_extent = 1e100;  // sums of two standardised inputs sta
 // Below this number of rows one hold-out decides by chance: five of them decide together.
 constexpr Eigen::Index few_rows = 500;
 constexpr Eigen::Index fewest_parts = 5;
-// Above this number of rows a part of them decides as well.
-constexpr Eigen::Index many_rows = 100000;
-constexpr Eigen::Index rows_of_part = 20000;
+constexpr Eigen::Index rows_of_part = 20000;  // of many rows: as many decide as well as a fifth
 
 Eigen::Index num_parts_of(Eigen::Index rows) { return rows > many_rows ? rows / rows_of_part : fewest_parts; }
 

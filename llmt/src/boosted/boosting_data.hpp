@@ -10,6 +10,9 @@
 
 namespace llmt {
 
+/// Above this number of rows fewer than a fifth are held out, all are in random order, and the rate is larger.
+inline constexpr Eigen::Index many_rows = 100000;
+
 /// Which rows boosting learns from, and which stop it.
 struct HoldOut {
   std::vector<int> train;

@@ -15,7 +15,6 @@ namespace {
 // docs/algorithms/boosting.md says on which tables these were chosen.
 constexpr Eigen::Index enough_for_races = 5000;
 constexpr Eigen::Index enough_for_fast = 10000;
-constexpr Eigen::Index enough_for_faster = 100001;
 constexpr int race_rounds = 50;
 constexpr Eigen::Index most_raced = 10000;  // rows that trees of the race learn from, or
 constexpr Eigen::Index raced_part = 4;      // a quarter of the rows, if that is more,
@@ -111,7 +110,7 @@ class OutputFit {
     if (data_.hold_outs.empty()) return mean_alone(summary);
     const Eigen::Index rows = y_.size();
     rounds_.tree = usual_trees(rows);
-    rounds_.rate = rows < enough_for_fast ? 0.05 : rows < enough_for_faster ? 0.07 : 0.1;
+    rounds_.rate = rows < enough_for_fast ? 0.05 : rows <= many_rows ? 0.07 : 0.1;
     if (rows < enough_for_races) rounds_.patience = data_.hold_outs.size() > 1 ? patience_of_folds : patience_of_few;
     rounds_.max_threads = options_.max_threads;
     name_ = "symmetric";

@@ -238,11 +238,11 @@ void SymmetricGrower::split(SplitChoice choice, bool is_refined, bool is_last) {
   }
   models_ = std::move(models);
   has_rows_ = std::move(has_rows);
-  levels_.push_back({choice.feature, choice.cell, choice.missing_left});
+  levels_.push_back(choice);
   if (!is_last) move_rows(levels_.back(), sides, is_refined);
 }
 
-void SymmetricGrower::move_rows(const Level& level, std::span<const SideModel> sides, bool is_packed) {
+void SymmetricGrower::move_rows(const SplitChoice& level, std::span<const SideModel> sides, bool is_packed) {
   const BinnedFeature& feature = rows_.features[level.feature];
   const RowBlocks blocks{std::ssize(leaves_), block_of_search};
   parallel_for(blocks.count(), max_threads_, [&](Eigen::Index block) {
@@ -290,7 +290,7 @@ GrowingTree SymmetricGrower::estimate(const GrowingTree& tree, const Eigen::Vect
 // The leaves of rows from `first` on.
 void SymmetricGrower::leaves_of_rows(Eigen::Index first, std::span<std::uint8_t> leaves) const {
   std::ranges::fill(leaves, 0);
-  for (const Level& level : levels_) {
+  for (const SplitChoice& level : levels_) {
     to_sides(leaves.data(), rows_.features[level.feature].cells.data() + first, leaves.size(),
              static_cast<std::uint16_t>(level.cell), level.missing_left ? missing_cell : 0);
   }

@@ -34,17 +34,11 @@ class SymmetricGrower {
   void subtract_last(const GrowingTree& tree, double rate, Eigen::VectorXd& residuals) const;
 
  private:
-  struct Level {
-    int feature = -1;
-    int cell = 0;
-    bool missing_left = false;
-  };
-
   void begin(const Eigen::VectorXd& residuals, bool is_searching);
   SplitChoice best_split(const std::vector<int>& features) const;
   SplitChoice best_of_features(std::span<const int> features) const;
   void split(SplitChoice choice, bool is_refined, bool is_last);
-  void move_rows(const Level& level, std::span<const SideModel> sides, bool is_packed);
+  void move_rows(const SplitChoice& level, std::span<const SideModel> sides, bool is_packed);
   void fit_leaves(const Eigen::VectorXd& residuals);
   void leaves_of_rows(Eigen::Index first, std::span<std::uint8_t> leaves) const;
   GrowingTree tree() const;
@@ -55,7 +49,7 @@ class SymmetricGrower {
   const TreeOptions options_;
   const int max_threads_;
   // The tree that grows.
-  std::vector<Level> levels_;
+  std::vector<SplitChoice> levels_;
   std::vector<int> features_;      // with slopes, which all leaves have
   std::vector<LeafModel> models_;  // of the paths, then of the leaves
   std::vector<bool> has_rows_;     // each of them

@@ -95,6 +95,13 @@ TEST(SymmetricGrower, FindsTheSplitsOfManyRowsOnAPartOfThem) {
     threads.subtract_last(threads.grow(y, random), 1.0, same_left);
     EXPECT_EQ(same_left, left);
   }
+  // In noise each part has a split of its own.
+  for (double& value : z) value = random.normal();
+  std::vector<int> cells;
+  llmt::SymmetricGrower of_noise(rows, count, options, 1);
+  for (int part = 0; part < 3; ++part) cells.push_back(of_noise.grow(z, random).front().cell);
+  EXPECT_NE(cells[1], cells[0]);
+  EXPECT_EQ(cells[2], cells[0]);
 }
 
 // About 20000 of them are held out, and the others are in random order.
