@@ -4,11 +4,11 @@
 #include <chrono>
 
 #include "llmt/arrow.hpp"
-#include "llmt/fit_options.hpp"
 #include "mpi/mpi_processes.hpp"
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
 #include "shared/options.hpp"
+#include "trees/fit_options.hpp"
 
 namespace {
 

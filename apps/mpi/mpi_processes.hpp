@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "llmt/arrow_fit.hpp"
+#include "trees/arrow_fit.hpp"
 
 namespace llmt::apps {
 

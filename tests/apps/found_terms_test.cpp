@@ -11,7 +11,7 @@
 #include "llmt/csv.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "llmt/random.hpp"
-#include "llmt/term_file.hpp"
+#include "trees/term_file.hpp"
 #include "report/terms/terms_summary.hpp"
 
 namespace {

@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "fuzz/fuzz.hpp"
-#include "llmt/term_file.hpp"
+#include "trees/term_file.hpp"
 
 namespace fuzz_terms {
 namespace {

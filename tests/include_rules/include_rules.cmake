@@ -21,8 +21,8 @@ set(public_header "^(llmt|robotics)/include/")
 set(discovery "^llmt/(include/llmt|src)/discovery/")
 
 rule(llmt_knows_no_robotics FILES "^llmt/" BANNED "^[\"<](llmt/)?robotics/")
-rule(libraries_know_no_apps FILES "${library}" BANNED "^[\"<](apps|shared)/")
-rule(reports_know_no_programs FILES "^apps/report/" BANNED "^[\"<](shared/|CLI|robot/)")
+rule(libraries_know_no_apps FILES "${library}" BANNED "^[\"<](apps|shared|trees)/")
+rule(reports_know_no_programs FILES "^apps/report/" BANNED "^[\"<](shared/|CLI|robot/|trees/)")
 rule(llmt_knows_no_expressions FILES "^llmt/(include|src)/" BANNED "^\"expressions/")
 rule(expressions_know_nobody FILES "^llmt/expressions/" BANNED "^[\"<](llmt|robotics|apps|shared)/")
 rule(no_parent_folders FILES "^(llmt|robotics|apps)/" BANNED "[.][.]/") # no way around the other rules

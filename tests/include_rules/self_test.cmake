@@ -36,7 +36,7 @@ check(discovery_knows_no_trees llmt/src/discovery/verdict.cpp "#include \"llmt/m
 check(discovery_knows_no_trees llmt/include/llmt/discovery/verdict.hpp "#include \"llmt/fit.hpp\"")
 check(trees_know_no_discovery llmt/src/fit.cpp "#include \"llmt/discovery/least_squares.hpp\"")
 check(tbb_in_one_source llmt/src/fit.cpp "#include <tbb/parallel_for.h>")
-check(tbb_in_one_source apps/llmt/main.cpp "#include <oneapi/tbb.h>")
+check(tbb_in_one_source apps/trees/main.cpp "#include <oneapi/tbb.h>")
 check(public_headers_include_eigen_only llmt/include/llmt/model.hpp "#include <nlohmann/json.hpp>")
 check(public_headers_include_eigen_only robotics/include/llmt/robotics/chain.hpp "#include <math.h>")
 check(public_headers_include_public_headers llmt/include/llmt/model.hpp "#include \"split_search.hpp\"")

@@ -28,7 +28,7 @@ check(none llmt/src/fit/fit.cpp "${lines_350}")
 check(none tests/llmt/fit/fit_test.cpp "${columns_120}\n\n${arrows_120}")
 check("length: robotics/include/llmt/robotics/chain.hpp has 351 lines" robotics/include/llmt/robotics/chain.hpp
       "${lines_350}int b;\n")
-check("length: apps/llmt/main.cpp has 352 lines" apps/llmt/main.cpp "${lines_350}\nint b;")
+check("length: apps/trees/main.cpp has 352 lines" apps/trees/main.cpp "${lines_350}\nint b;")
 check("width: bench/data_sets.cpp:3 has 121 columns" bench/data_sets.cpp "\\\n[\n${columns_120}x\n]\n;\n")
 check("width: docs/examples/fit.cpp:1 has 121 columns" docs/examples/fit.cpp "→${arrows_120}\n")
 file(REMOVE_RECURSE "${WORK_DIR}")

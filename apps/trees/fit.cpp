@@ -1,0 +1,220 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "llmt/arrow.hpp"
+#include "llmt/fit.hpp"
+#include "llmt/readable.hpp"
+#include "llmt/teach.hpp"
+#include "report/fit/fit_summary.hpp"
+#include "report/fit/of_fit.hpp"
+#include "report/fit/readable_summary.hpp"
+#include "report/fit/teaching_summary.hpp"
+#include "shared/cli.hpp"
+#include "shared/help.hpp"
+#include "shared/options.hpp"
+#include "shared/report_files.hpp"
+#include "shared/table_file.hpp"
+#include "trees/arrow_fit.hpp"
+#include "trees/boost_command.hpp"
+#include "trees/commands.hpp"
+#include "trees/fit_options.hpp"
+#include "trees/gross_errors.hpp"
+#include "trees/learning.hpp"
+#include "trees/stream_command.hpp"
+
+namespace llmt::apps {
+namespace {
+
+struct FitArguments {
+  LearningArguments learning;
+  std::string output;
+  bool json = false;
+  bool no_intervals = false;
+  bool stream = false;
+  bool boost = false;
+  bool teach = false;
+  ArrowFitArguments arrow;
+  std::string readable;  ///< the loss in per cent; empty: none is asked for
+  ReportFiles reports;
+};
+
+constexpr NumberRange per_cent = {0.0, 1000.0, "a number of per cent from 0 to 1000"};
+constexpr const char* readable_extension = ".readable.json";
+
+// Whether the model's file has intervals.
+bool keeps_intervals(const FitArguments& arguments) { return !arguments.no_intervals && !arguments.output.empty(); }
+
+// The rows are made ready once, for the model and the readable tree.
+struct Fitting {
+  PreparedFit prepared;
+  FitResult result;
+  std::optional<TaughtResult> taught = {};
+};
+
+Fitting fit_with_bar(const FitArguments& arguments, const LearningTable& table) {
+  ProgressBar bar("fitting");
+  Work work(bar.callback());
+  Work preparing(work, table.options.loss == Loss::tukey ? 0.2 : 0.05);
+  const PreparedFit prepared(table.data, table.options, preparing.progress());
+  Work fitting(work, work.left());
+  if (!arguments.teach) return {prepared, fit(prepared, fitting.progress())};
+  TaughtResult taught = fit_taught(prepared, {.seed = table.options.folds.seed}, fitting.progress());
+  return {taught.prepared, taught.fit, taught};
+}
+
+// The readable tree beside the model, written if the model is.
+std::optional<ReadableResult> make_readable(const FitArguments& arguments, const Fitting& fitting, double loss) {
+  const FitSummary& fitted = fitting.result.summary;
+  if (fitted.partitions.front().cv_folds == 0) {
+    throw std::runtime_error(
+        fmt::format("{}: --readable chooses on held-out rows, and the {} row(s) leave none to hold out",
+                    table_name(arguments.learning.data), fitted.samples));
+  }
+  ProgressBar bar("readable tree");
+  ReadableResult readable = fit_readable(fitting.prepared, fitted, loss, bar.callback());
+  bar.clear();
+  if (!arguments.output.empty()) {
+    save(readable.model, keeps_intervals(arguments) ? readable.intervals : Intervals(),
+         beside(arguments.output, readable_extension).string());
+  }
+  return readable;
+}
+
+// A report shows a readable tree beside the model wherever one can be made. It does not show rows that the loss leaves
+// out: they would set the axes.
+std::string write_fit_reports(const FitArguments& arguments, const LearningTable& table, const Fitting& fitting,
+                              const std::optional<ReadableResult>& readable) {
+  if (!arguments.reports.wanted()) return "";
+  const FitResult& result = fitting.result;
+  std::optional<ReadableResult> shown = readable;
+  const bool has_folds = result.summary.partitions.front().cv_folds > 0;
+  if (!shown && has_folds && why_not_readable(table.options).empty()) {
+    shown = fit_readable(fitting.prepared, result.summary);
+  }
+  const TrainingData& data = *table.data;
+  const std::vector<Eigen::Index> left_out = report::rows_left_out(result.summary.loss_weights, data.weights);
+  const auto report_on = [&](const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const FitResult& of_rows) {
+    return write_reports(arguments.reports, report::fit_report({arguments.learning.data, inputs, outputs, table.options,
+                                                                of_rows, shown, std::ssize(left_out)}));
+  };
+  if (left_out.empty()) return report_on(data.inputs, data.outputs, result);
+  std::vector<Eigen::Index> kept;
+  std::vector<Eigen::Index> place(data.outputs.rows(), -1);  // among the kept rows
+  for (Eigen::Index row = 0; row < data.outputs.rows(); ++row) {
+    if (!(result.summary.loss_weights(row) > 0.0)) continue;
+    place[row] = std::ssize(kept);
+    kept.push_back(row);
+  }
+  FitResult of_kept = result;
+  for (std::vector<Eigen::Index>& of_fold : of_kept.summary.held_out) {
+    for (Eigen::Index& row : of_fold) row = place[row];
+  }
+  return report_on(data.inputs(kept, Eigen::all), data.outputs(kept, Eigen::all), of_kept);
+}
+
+void fit_command(FitArguments arguments) {
+  double loss = 0.0;
+  if (!arguments.readable.empty()) {
+    loss = read_number("--readable", arguments.readable, per_cent) / 100.0;
+  }
+  LearningTable table = read_learning_table(arguments.learning);
+  if (const std::string why = why_not_taught(table.options); arguments.teach && !why.empty()) {
+    throw std::invalid_argument("llmt::fit_taught: --teach does not go with " + why);
+  }
+  if (const std::string why = why_not_readable(table.options); !arguments.readable.empty() && !why.empty()) {
+    throw std::invalid_argument("llmt::fit_readable: --readable does not go with " + why);
+  }
+  // Folds' models say which rows no model predicts; the report needs them too, and the file unless it is to be small.
+  const bool looks_for_gross_errors = table.options.loss == Loss::squared;
+  table.options.intervals = keeps_intervals(arguments) || arguments.reports.wanted() || looks_for_gross_errors;
+  Fitting fitting = fit_with_bar(arguments, table);
+  FitResult& result = fitting.result;
+  warn_of_gross_errors(arguments.learning, table, result);
+  if (!arguments.output.empty()) {
+    save(result.model, keeps_intervals(arguments) ? result.intervals : Intervals(), arguments.output);
+  }
+  std::optional<ReadableResult> readable;
+  if (!arguments.readable.empty()) readable = make_readable(arguments, fitting, loss);
+  const std::string reports = write_fit_reports(arguments, table, fitting, readable);
+  report::FitRun run{arguments.learning.data, table.options, *table.data, table.lines, arguments.output};
+  if (arguments.json) {
+    Json summary = report::fit_json(run, result);
+    if (fitting.taught) summary["teaching"] = report::teaching_json(*fitting.taught);
+    if (readable) summary["readable"] = report::readable_json(*readable);
+    print_json(summary);
+    return;
+  }
+  run.data = table_name(run.data);
+  print(report::fit_text(run, result, output_width()));
+  if (fitting.taught) print(report::teaching_text(*fitting.taught, output_width()));
+  if (readable) print(report::readable_text(result, *readable, loss, output_width()));
+  if (readable && !arguments.output.empty()) {
+    print(fmt::format("Readable tree written to {}; llmt inspect --rules prints it\n",
+                      beside(arguments.output, readable_extension).string()));
+  }
+  print(reports);
+  if (arguments.output.empty()) print("Not written: give -o FILE.json\n");
+}
+
+}  // namespace
+
+void add_fit(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("fit", "Learn a model from a table");
+  command->footer("Example: llmt fit concrete.csv --target strength -o concrete.json");
+  const auto arguments = std::make_shared<FitArguments>();
+  add_learning_options(*command, arguments->learning);
+  add_fit_options(*command, arguments->learning.options);
+  add_output_file(*command, "-o,--output", arguments->output, "Model file to write", {readable_extension});
+  command
+      ->add_flag("--no-intervals", arguments->no_intervals,
+                 "Leave the folds' models out of the file; it is smaller and has no prediction intervals")
+      ->group(expert_options);
+  command
+      ->add_flag("--readable{15}", arguments->readable,
+                 "Also the smallest crisp tree with short, rounded equations whose held-out error is at most this many "
+                 "per cent above that of the best crisp tree [15]; written beside the model as NAME.readable.json")
+      ->option_text("[=LOSS]");
+  command->add_flag("--teach", arguments->teach,
+                    "Fit the tree to the answers of a sum of trees (--boost), on the rows and on rows made of them; "
+                    "taken if its held-out error is smaller. Takes several times as long");
+  add_report_options(*command, arguments->reports, "predicted against observed");
+  command->add_flag("--json", arguments->json, "Print the summary as JSON");
+  command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory");
+  command->add_flag("--boost", arguments->boost,
+                    "A sum of many small trees, each fitted to what those before it leave: more accurate than one tree "
+                    "as a rule, and nobody reads it");
+  add_arrow_fit_options(*command, arguments->arrow);
+  command->callback([command, arguments] {
+    if (is_arrow_file(arguments->learning.data) || !arguments->arrow.more.empty()) {
+      ArrowFitArguments arrow = arguments->arrow;
+      arrow.learning = arguments->learning;
+      arrow.output = arguments->output;
+      arrow.json = arguments->json;
+      arrow.no_intervals = arguments->no_intervals;
+      Processes alone;
+      arrow_fit_command(*command, arrow, alone);
+      return;
+    }
+    for (const char* option : {"--memory", "--checkpoint", "--resume"}) {
+      if (command->count(option) > 0) {
+        throw std::invalid_argument(fmt::format("{}: {} is for Arrow files, and for several; llmt table makes one",
+                                                arguments->learning.data, option));
+      }
+    }
+    require_target(arguments->learning);
+    if (arguments->stream) {
+      stream_command(*command, {arguments->learning, arguments->output, arguments->json});
+      return;
+    }
+    if (arguments->boost) {
+      boost_command(*command, {arguments->learning, arguments->output, arguments->json});
+      return;
+    }
+    fit_command(*arguments);
+  });
+}
+
+}  // namespace llmt::apps

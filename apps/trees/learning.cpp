@@ -1,0 +1,271 @@
+#include "trees/learning.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+#include "llmt/arrow.hpp"
+#include "llmt/csv.hpp"
+#include "report/table/named_inputs.hpp"
+#include "shared/cli.hpp"
+#include "shared/help.hpp"
+#include "shared/options.hpp"
+#include "shared/table_file.hpp"
+#include "trees/arrow_learning.hpp"
+
+namespace llmt::apps {
+namespace {
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+constexpr std::size_t named_rows = 5;
+
+// "lines 13 (5.3e+03), 57 (-4e+03)".
+std::string places_of(const Csv& csv, const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& target) {
+  std::string text = rows.size() == 1 ? "line " : "lines ";
+  for (std::size_t k = 0; k < std::min(rows.size(), named_rows); ++k) {
+    text += fmt::format("{}{} ({:.4g})", k == 0 ? "" : ", ", csv.line_of(rows[k]), target(rows[k]));
+  }
+  return rows.size() > named_rows ? text + ", ..." : text;
+}
+
+// Says which few rows decide a fit by squares. Refuses a value beside which all others are rounding errors.
+void look_for_dominant_rows(const Csv& csv, const LearningArguments& arguments,
+                            const report::LearningColumns& columns) {
+  if (arguments.options.loss != Loss::squared) return;
+  for (std::size_t o = 0; o < arguments.targets.size(); ++o) {
+    const Eigen::VectorXd target = columns.targets.col(o);
+    const DominantRows dominant = dominant_rows_of_target(target, columns.weights);
+    if (dominant.rows.empty()) continue;
+    const std::string& name = arguments.targets[o];
+    if (dominant.hide_the_others) {
+      throw std::runtime_error(fmt::format(
+          "{}:{}: column \"{}\": {:.6g} is so large that the differences between all other values are below its "
+          "rounding error; correct it, delete the line, or use --loss tukey",
+          csv.name(), csv.line_of(dominant.rows.front()), name, target(dominant.rows.front())));
+    }
+    warn(fmt::format(
+        "llmt: {} of {} rows {} {:.3g} % of the squares of \"{}\" about its median: {}. If they are mistakes, correct "
+        "them or use --loss tukey",
+        dominant.rows.size(), target.size(), dominant.rows.size() == 1 ? "carries" : "carry", 100.0 * dominant.share,
+        name, places_of(csv, dominant.rows, target)));
+  }
+}
+
+// Says where one row or a constant target leaves nothing to learn.
+void look_for_nothing_to_learn(const Csv& csv, const LearningArguments& arguments,
+                               const report::LearningColumns& columns) {
+  if (csv.rows() == 1) {
+    warn(fmt::format("llmt: {} has one row: the model is the target of that row everywhere", csv.name()));
+    return;
+  }
+  for (std::size_t o = 0; o < arguments.targets.size(); ++o) {
+    const auto target = columns.targets.col(static_cast<Eigen::Index>(o));
+    if (target.minCoeff() < target.maxCoeff()) continue;
+    warn(fmt::format("llmt: target \"{}\" is {} in every row: the model is that constant", arguments.targets[o],
+                     target(0)));
+  }
+}
+
+// Says which columns are inputs although they look like names or numbers of the rows. Nothing is said of inputs that
+// were asked for.
+void look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
+                                const report::InputColumns& inputs) {
+  if (!arguments.inputs.empty()) return;
+  for (const report::AccidentalInput& found : report::accidental_inputs(inputs)) {
+    const std::string& name = names[found.input];
+    if (found.kind == report::AccidentalInput::Kind::row_numbers) {
+      warn(fmt::format("llmt: column \"{}\" numbers the rows and is an input; --ignore leaves it out", name));
+      continue;
+    }
+    if (contains(arguments.categorical, name)) continue;
+    if (found.kind == report::AccidentalInput::Kind::unit) {
+      warn(fmt::format(
+          "llmt: column \"{}\": every cell is a number and \"{}\", and is taken for categories; leave the unit "
+          "out of the cells to have numbers, --categorical says that categories are meant",
+          name, found.unit));
+      continue;
+    }
+    const std::string advice =
+        found.kind == report::AccidentalInput::Kind::dates
+            ? fmt::format(
+                  "it looks like a date: leave it out (--ignore {}) or give a number, as days; --categorical says that "
+                  "categories are meant",
+                  name)
+            : "--ignore leaves it out, --categorical says that it is meant";
+    warn(fmt::format("llmt: column \"{}\" has words, {} different ones in {} rows, and is taken for categories; {}",
+                     name, inputs.levels[found.input].size(), inputs.values.rows(), advice));
+  }
+}
+
+}  // namespace
+
+DominantRows dominant_rows_of_target(const Eigen::Ref<const Eigen::VectorXd>& target, const Eigen::VectorXd& weights) {
+  if (weights.size() == 0) return dominant_rows(target);
+  return dominant_rows((weights.array() > 0.0).select(target, robust_scale(target).median));
+}
+
+void require_target(const LearningArguments& arguments) {
+  if (!arguments.targets.empty()) return;
+  const Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
+  throw std::invalid_argument(fmt::format("--target is required: what to predict; the columns of {} are {}", csv.name(),
+                                          csv_row(csv.columns())));
+}
+
+std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments) {
+  for (const std::vector<std::string>* names : {&arguments.targets, &arguments.inputs, &arguments.ignored}) {
+    for (const std::string& name : *names) {
+      csv.index_of(name);
+      if (std::count(names->begin(), names->end(), name) > 1) {
+        throw std::invalid_argument(fmt::format("column \"{}\" is named twice", name));
+      }
+    }
+  }
+  for (const std::string& target : arguments.targets) {
+    if (contains(arguments.ignored, target)) {
+      throw std::invalid_argument(fmt::format("column \"{}\" is a target and ignored", target));
+    }
+    if (target == arguments.weight) {
+      throw std::invalid_argument(fmt::format("column \"{}\" is a target and the weight", target));
+    }
+  }
+  std::vector<std::string> inputs;
+  for (const std::string& column : arguments.inputs.empty() ? csv.columns() : arguments.inputs) {
+    if (!contains(arguments.targets, column) && !contains(arguments.ignored, column) && column != arguments.weight) {
+      inputs.push_back(column);
+    } else if (!arguments.inputs.empty()) {
+      throw std::invalid_argument(fmt::format("--inputs has \"{}\", which is a target, the weight or ignored", column));
+    }
+  }
+  if (inputs.empty()) throw std::invalid_argument("no column is left to learn from");
+  return inputs;
+}
+
+std::vector<std::string> choose_inputs(const std::vector<std::string>& columns, const std::string& name,
+                                       const LearningArguments& arguments) {
+  std::string header;
+  for (const std::string& column : columns) header += (header.empty() ? "" : ",") + csv_field(column);
+  const Csv csv = Csv::parse(header + "\n", name);
+  if (!arguments.weight.empty()) csv.index_of(arguments.weight);
+  return choose_inputs(csv, arguments);
+}
+
+std::vector<Trend> trends_of(const LearningArguments& arguments, const std::vector<std::string>& inputs,
+                             const std::vector<std::vector<std::string>>& levels) {
+  const std::vector<int> monotone = report::signs_of("--monotone", arguments.monotone, inputs);
+  const std::vector<int> slopes = report::signs_of("--slope-sign", arguments.slope_signs, inputs);
+  if (monotone.empty() && slopes.empty()) return {};
+  std::vector<Trend> trends(inputs.size(), Trend::any);
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
+    const int of_prediction = monotone.empty() ? 0 : monotone[j];
+    const int of_slopes = slopes.empty() ? 0 : slopes[j];
+    if ((of_prediction != 0 || of_slopes != 0) && !levels[j].empty()) {
+      throw std::invalid_argument(fmt::format("{} names \"{}\", which is categorical",
+                                              of_prediction != 0 ? "--monotone" : "--slope-sign", inputs[j]));
+    }
+    if (of_prediction * of_slopes < 0) {
+      throw std::invalid_argument(
+          fmt::format("--monotone and --slope-sign name \"{}\" with opposite signs", inputs[j]));
+    }
+    if (of_slopes != 0) trends[j] = of_slopes > 0 ? Trend::rising_slopes : Trend::falling_slopes;
+    if (of_prediction != 0) trends[j] = of_prediction > 0 ? Trend::rising : Trend::falling;
+  }
+  return trends;
+}
+
+namespace {
+
+std::vector<Eigen::Index> lines_of_rows(const Csv& csv) {
+  std::vector<Eigen::Index> rows(csv.rows());
+  std::iota(rows.begin(), rows.end(), Eigen::Index{0});
+  return csv.lines_of(rows);
+}
+
+}  // namespace
+
+LearningTable read_learning_table(const LearningArguments& arguments) {
+  if (is_arrow_file(arguments.data)) return read_arrow_learning_table(arguments);
+  const Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
+  if (csv.rows() == 0) {
+    throw std::runtime_error(fmt::format("{}: there is a header and no rows", csv.name()));
+  }
+  const std::vector<std::string> inputs = choose_inputs(csv, arguments);
+  const report::ColumnAdvice advice{
+      .leave_out = arguments.inputs.empty() ? " (--ignore COLUMN leaves a column out)" : "",
+      .as_categories = "--categorical"};
+  const double largest_input = arguments.options.terms == LocalTerms::quadratic ? largest_factor : largest_magnitude;
+  report::LearningColumns columns =
+      report::read_learning_columns(csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, advice,
+                                    largest_input, arguments.options.max_threads);
+  look_for_dominant_rows(csv, arguments, columns);
+  look_for_accidental_inputs(arguments, inputs, columns.inputs);
+  look_for_nothing_to_learn(csv, arguments, columns);
+  LearningTable table{nullptr, arguments.options, lines_of_rows(csv)};
+  FitOptions& options = table.options;
+  options.split_inputs = report::positions_of("--split-inputs", arguments.split_inputs, inputs);
+  options.regression_inputs = report::positions_of("--regression-inputs", arguments.regression_inputs, inputs);
+  options.trends = trends_of(arguments, inputs, columns.inputs.levels);
+  options.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
+  TrainingData data{.inputs = std::move(columns.inputs.values), .outputs = std::move(columns.targets)};
+  data.weights = std::move(columns.weights);
+  data.levels = std::move(columns.inputs.levels);
+  data.may_have_codes = arguments.may_have_codes;
+  data.input_names = inputs;
+  data.output_names = arguments.targets;
+  table.data = std::make_shared<const TrainingData>(std::move(data));
+  return table;
+}
+
+void add_learning_options(CLI::App& command, LearningArguments& arguments) {
+  FitOptions& options = arguments.options;
+  const auto expert = [](CLI::Option* option) { option->group(expert_options); };
+  const auto by_default = [](const char* help, std::string_view option) {
+    return fmt::format("{} [{}]", help, default_text(option));
+  };
+  add_input_file(command, "data", arguments.data, "CSV file with a header row; - is standard input")->required();
+  add_names(command, "-t,--target", arguments.targets, "COLUMN", "What to predict (required)");
+  add_names(command, "--inputs", arguments.inputs, "COLUMN", "What to learn from [all but targets and ignored]");
+  add_names(command, "--ignore", arguments.ignored, "COLUMN", "What to leave out");
+  add_names(command, "--categorical", arguments.categorical, "COLUMN",
+            "Inputs that are categories although they are written as numbers; columns of words are anyway");
+  command.add_option("--weight", arguments.weight, "The weights of the rows [1 for each]")->type_name("COLUMN");
+  add_decimal_comma(command, arguments.mark);
+  add_thousands(command, arguments.thousands);
+  add_count(command, "--cv", options.folds.count, 0,
+            "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
+      ->capture_default_str();
+  command.add_flag("--contiguous", arguments.contiguous,
+                   "Folds are blocks of consecutive rows (measured paths, grids, time series)");
+  add_count(command, "--max-leaves", options.max_leaves, Eigen::Index{0}, "Most leaves of a tree; 0: the default")
+      ->default_str(default_text("max_leaves"));
+  add_threads(command, options.max_threads);
+  expert(add_names(command, "--split-inputs", arguments.split_inputs, "COLUMN", "Inputs that may be split [all]"));
+  expert(add_names(command, "--regression-inputs", arguments.regression_inputs, "COLUMN",
+                   "Inputs of the local models [all]"));
+  expert(command.add_flag_callback(
+      "--all-inputs", [&options] { options.choose_inputs = false; },
+      "Keep inputs that do not lower the held-out error"));
+  expert(command.add_flag_callback(
+      "--no-codes", [&arguments] { arguments.may_have_codes = false; },
+      "Do not take inputs of few whole numbers for categories where that lowers the held-out error"));
+  expert(add_names(command, "--monotone", arguments.monotone, "COLUMN",
+                   "Inputs with which the prediction never falls, or with a leading minus never rises "
+                   "(--monotone=-x)"));
+  expert(add_names(command, "--slope-sign", arguments.slope_signs, "COLUMN",
+                   "Inputs with slopes >= 0, or with a leading minus <= 0, in every local model; not across leaves"));
+  expert(add_count(command, "--min-leaf", options.min_leaf_samples, Eigen::Index{0},
+                   by_default("Fewest rows in a leaf; 0: the default", "min_leaf_samples")));
+  expert(command.add_flag_callback(
+      "--prune", [&options] { options.pruning = Pruning::weakest_link; },
+      "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better"));
+  expert(add_seed(command, options.folds.seed,
+                  "Of the random folds; with --boost, of the held-out rows and of the features looked at"));
+}
+
+}  // namespace llmt::apps
