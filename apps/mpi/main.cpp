@@ -24,16 +24,15 @@ int run_program(int argc, char** argv) {
   app.set_help_all_flag("--help-all", "Help with all options, also those for experts");
   ArrowFitArguments arguments;
   add_learning_options(app, arguments.learning);
-  add_fit_options(app, arguments.learning.options);
+  add_fit_options(app, arguments.learning.options, arguments.learning.columns);
   add_output_file(app, "-o,--output", arguments.output, "Model file to write");
-  app.add_flag("--no-intervals", arguments.no_intervals, "Leave the folds' models out of the file")
-      ->group(expert_options);
   app.add_flag("--json", arguments.json, "Print the summary as JSON");
   add_arrow_fit_options(app, arguments);
   double patience = 86400.0;
   add_number(
       app, "--patience", patience, above_zero,
       "Seconds that a process waits for another before the job ends; the first one also fits branches meanwhile");
+  require_forms(app);
   app.callback([&] {
     for (const std::string& file : arguments.files()) {
       if (!llmt::is_arrow_file(file)) throw std::invalid_argument(file + ": is no Arrow file; llmt table makes one");

@@ -13,22 +13,9 @@
 #include <vector>
 
 #include "llmt/csv.hpp"
+#include "llmt/option_fields.hpp"
 
 namespace llmt::apps {
-
-/// Numbers from `low` to `high`, both included. NaN is in no range.
-struct NumberRange {
-  double low;
-  double high;
-  const char* words;  ///< "a number from 0 to 1"
-};
-
-inline constexpr double largest_number = std::numeric_limits<double>::max();
-inline constexpr double smallest_number = std::numeric_limits<double>::denorm_min();
-inline constexpr NumberRange any_share = {0.0, 1.0, "a number from 0 to 1"};
-inline constexpr NumberRange share_set_aside = {0.0, 0.9, "a number from 0 to 0.9"};
-inline constexpr NumberRange not_negative = {0.0, largest_number, "a finite number, 0 or more"};
-inline constexpr NumberRange above_zero = {smallest_number, largest_number, "a finite number above 0"};
 
 /// An option with a number, shown as NUMBER. Reading it throws std::invalid_argument that names option, text and range,
 /// if the text is no number or outside the range.

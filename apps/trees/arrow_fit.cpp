@@ -33,22 +33,6 @@ constexpr double part_for_branches = 0.75;
 // A sample takes this part of a branch's rows at most: a pass holds several before they are merged.
 constexpr Eigen::Index part_for_sample = 4;
 
-void refuse_options_of_csv(const CLI::App& command) {
-  constexpr std::string_view taken[] = {
-      "data",         "more",         "target",        "inputs",   "ignore",   "weight",       "cv",
-      "max-leaves",   "min-leaf",     "threads",       "rule",     "validity", "width",        "jump",
-      "ridge",        "shrinkage",    "estimation",    "sparse",   "seed",     "significance", "prune",
-      "loss",         "json",         "output",        "memory",   "resume",   "patience",     "checkpoint",
-      "local-models", "no-intervals", "decimal-comma", "thousands"};
-  for (const CLI::Option* option : command.get_options()) {
-    const std::string name = option->get_single_name();
-    if (option->count() > 0 && std::ranges::find(taken, name) == std::end(taken)) {
-      throw std::invalid_argument(
-          fmt::format("--{} is not for Arrow files or several files; give the table as one CSV file", name));
-    }
-  }
-}
-
 // The rows first ... last - 1.
 struct RowRange {
   Eigen::Index first;
@@ -180,7 +164,7 @@ void add_arrow_fit_options(CLI::App& command, ArrowFitArguments& arguments) {
 }
 
 void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& arguments, Processes& processes) {
-  refuse_options_of_csv(command);
+  refuse_options(command, of_files);
   if (arguments.resume && arguments.checkpoint.empty()) {
     throw std::invalid_argument("--resume goes on from the file of --checkpoint, which is not given");
   }
@@ -195,17 +179,20 @@ void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& argumen
   columns.names = choose_inputs(table.columns(), table.name(), learning);
   columns.inputs = std::ssize(columns.names);
   columns.names.push_back(learning.targets.front());
-  distributed::Options options{.weighted = !learning.weight.empty(), .fit = learning.options};
+  distributed::Options options{
+      .weighted = !learning.weight.empty(), .may_have_codes = learning.may_have_codes, .fit = learning.options};
   if (options.weighted) columns.names.push_back(learning.weight);
   const std::vector<std::string> inputs(columns.names.begin(), columns.names.begin() + columns.inputs);
   table.require_numbers({columns.names.begin() + columns.inputs, columns.names.end()});
-  options.fit.intervals = !arguments.no_intervals;
   options.branch_rows = branch_rows_of(arguments, columns.names.size());
   options.sample_rows =
       std::min(options.sample_rows, std::max<Eigen::Index>(options.branch_rows / part_for_sample, 100));
   const bool is_first = processes.rank() == 0;
   constexpr std::size_t most_words = 255;  // distributed::Options::levels
-  if (is_first) options.levels = table.levels(inputs, most_words);
+  if (is_first) {
+    options.levels = table.levels(inputs, most_words);
+    set_columns(learning.columns, inputs, options.levels, options.fit);
+  }
   distributed::State state = distributed::State::from_bytes(
       processes.of_first(is_first ? first_state(arguments, inputs, options).to_bytes() : std::string()));
   columns.levels = state.levels();

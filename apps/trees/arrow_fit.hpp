@@ -16,7 +16,6 @@ struct ArrowFitArguments {
   LearningArguments learning;
   std::string output;
   bool json = false;
-  bool no_intervals = false;
   std::vector<std::string> more;  ///< files behind learning.data
   std::string memory;             ///< "4G"; empty: half of the machine's
   std::string checkpoint;         ///< file of the state after every pass; empty: none

@@ -9,7 +9,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "report/table/named_inputs.hpp"
 #include "shared/options.hpp"
 
 namespace llmt::apps {
@@ -75,12 +74,7 @@ LearningTable read_arrow_learning_table(const LearningArguments& arguments) {
   TrainingData data = read_into_memory(table, arguments);
   LearningTable learning{nullptr, arguments.options, std::vector<Eigen::Index>(table.rows())};
   std::iota(learning.lines.begin(), learning.lines.end(), Eigen::Index{1});
-  FitOptions& options = learning.options;
-  options.split_inputs = report::positions_of("--split-inputs", arguments.split_inputs, data.input_names);
-  options.regression_inputs =
-      report::positions_of("--regression-inputs", arguments.regression_inputs, data.input_names);
-  options.trends = trends_of(arguments, data.input_names, data.levels);
-  options.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
+  set_columns(arguments.columns, data.input_names, data.levels, learning.options);
   learning.data = std::make_shared<const TrainingData>(std::move(data));
   return learning;
 }

@@ -1,9 +1,6 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <stdexcept>
-#include <string_view>
 
 #include "llmt/boosted.hpp"
 #include "report/fit/boosted_summary.hpp"
@@ -12,24 +9,8 @@
 #include "trees/boost_command.hpp"
 
 namespace llmt::apps {
-namespace {
-
-void refuse_options_of_one_tree(const CLI::App& command) {
-  constexpr std::array<std::string_view, 13> taken = {"data",   "target",  "inputs", "ignore",        "categorical",
-                                                      "weight", "output",  "json",   "decimal-comma", "thousands",
-                                                      "boost",  "threads", "seed"};
-  for (const CLI::Option* option : command.get_options()) {
-    const std::string name = option->get_single_name();
-    if (option->count() > 0 && std::ranges::find(taken, name) == taken.end()) {
-      throw std::invalid_argument(fmt::format("--{} is not for --boost; one tree takes it", name));
-    }
-  }
-}
-
-}  // namespace
-
 void boost_command(const CLI::App& command, const BoostArguments& arguments) {
-  refuse_options_of_one_tree(command);
+  refuse_options(command, boosting);
   const LearningTable table = read_learning_table(arguments.learning);
   if (const Eigen::Index rows = table.data->outputs.rows(); rows < fewest_boosted_rows) {
     throw std::runtime_error(

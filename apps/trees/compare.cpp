@@ -72,7 +72,7 @@ void add_compare(CLI::App& app) {
   command->footer("Example: llmt compare concrete.csv --target strength");
   const auto arguments = std::make_shared<CompareArguments>();
   add_learning_options(*command, arguments->learning);
-  add_loss(*command, arguments->learning.options.loss);
+  add_fit_options(*command, arguments->learning.options, arguments->learning.columns, true);
   add_report_options(*command, arguments->reports, "the held-out error of every method");
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments] { compare_command(*arguments); });

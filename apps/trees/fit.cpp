@@ -32,7 +32,6 @@ struct FitArguments {
   LearningArguments learning;
   std::string output;
   bool json = false;
-  bool no_intervals = false;
   bool stream = false;
   bool boost = false;
   bool teach = false;
@@ -45,7 +44,9 @@ constexpr NumberRange per_cent = {0.0, 1000.0, "a number of per cent from 0 to 1
 constexpr const char* readable_extension = ".readable.json";
 
 // Whether the model's file has intervals.
-bool keeps_intervals(const FitArguments& arguments) { return !arguments.no_intervals && !arguments.output.empty(); }
+bool keeps_intervals(const FitArguments& arguments) {
+  return arguments.learning.options.intervals && !arguments.output.empty();
+}
 
 // The rows are made ready once, for the model and the readable tree.
 struct Fitting {
@@ -166,12 +167,8 @@ void add_fit(CLI::App& app) {
   command->footer("Example: llmt fit concrete.csv --target strength -o concrete.json");
   const auto arguments = std::make_shared<FitArguments>();
   add_learning_options(*command, arguments->learning);
-  add_fit_options(*command, arguments->learning.options);
+  add_fit_options(*command, arguments->learning.options, arguments->learning.columns);
   add_output_file(*command, "-o,--output", arguments->output, "Model file to write", {readable_extension});
-  command
-      ->add_flag("--no-intervals", arguments->no_intervals,
-                 "Leave the folds' models out of the file; it is smaller and has no prediction intervals")
-      ->group(expert_options);
   command
       ->add_flag("--readable{15}", arguments->readable,
                  "Also the smallest crisp tree with short, rounded equations whose held-out error is at most this many "
@@ -187,13 +184,13 @@ void add_fit(CLI::App& app) {
                     "A sum of many small trees, each fitted to what those before it leave: more accurate than one tree "
                     "as a rule, and nobody reads it");
   add_arrow_fit_options(*command, arguments->arrow);
+  require_forms(*command);
   command->callback([command, arguments] {
     if (is_arrow_file(arguments->learning.data) || !arguments->arrow.more.empty()) {
       ArrowFitArguments arrow = arguments->arrow;
       arrow.learning = arguments->learning;
       arrow.output = arguments->output;
       arrow.json = arguments->json;
-      arrow.no_intervals = arguments->no_intervals;
       Processes alone;
       arrow_fit_command(*command, arrow, alone);
       return;

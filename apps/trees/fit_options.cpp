@@ -1,113 +1,176 @@
 #include "trees/fit_options.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "llmt/names.hpp"
+#include "report/table/named_inputs.hpp"
 #include "shared/help.hpp"
-#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
 
-constexpr NumberRange threshold_or_inf = {0.0, std::numeric_limits<double>::infinity(),
-                                          "a number of 0 or more, or inf"};
+// An option of `llmt fit` that is no field of FitOptions, and the forms that take it beside one tree in memory.
+struct OtherOption {
+  std::string_view name;
+  std::string_view forms;
+};
 
-// One of the names of a choice, its default at the end of its help.
-template <class Enum>
-CLI::Option* add_choice(CLI::App& command, const std::string& name, Enum& value, const std::string& help) {
-  const auto take = [name, &value](const CLI::results_t& texts) {
-    std::vector<std::string> names;
-    for (const Choice<Enum>& choice : choices<Enum>()) {
-      names.emplace_back(choice.name);
-      if (choice.name == texts.back()) value = choice.value;
+constexpr OtherOption other_options[] = {{"help", "stream boost files"},
+                                         {"help-all", "stream boost files"},
+                                         {"data", "stream boost files"},
+                                         {"target", "stream boost files"},
+                                         {"inputs", "stream boost files"},
+                                         {"ignore", "stream boost files"},
+                                         {"weight", "stream boost files"},
+                                         {"decimal-comma", "stream boost files"},
+                                         {"thousands", "stream boost files"},
+                                         {"output", "stream boost files"},
+                                         {"json", "stream boost files"},
+                                         {"stream", "stream"},
+                                         {"boost", "boost"},
+                                         {"categorical", "boost"},
+                                         {"no-codes", "files"},
+                                         {"more", "files"},
+                                         {"memory", "files"},
+                                         {"checkpoint", "files"},
+                                         {"resume", "files"},
+                                         {"patience", "files"},
+                                         {"readable", ""},
+                                         {"teach", ""},
+                                         {"plot", ""},
+                                         {"report", ""}};
+
+// Whether `flags`, "--a or --b", has an option of this name.
+bool has_flag(std::string_view flags, std::string_view name) {
+  for (std::size_t at = flags.find(name); at != std::string_view::npos; at = flags.find(name, at + 1)) {
+    const std::size_t end = at + name.size();
+    if (at >= 2 && flags.substr(at - 2, 2) == "--" && (end == flags.size() || flags[end] == ' ')) return true;
+  }
+  return false;
+}
+
+const OptionField* field_of(std::string_view name) {
+  for (const OptionField& field : option_fields()) {
+    if (has_flag(field.flag, name)) return &field;
+  }
+  return nullptr;
+}
+
+const OtherOption* other_option(std::string_view name) {
+  const auto found = std::ranges::find(other_options, name, &OtherOption::name);
+  return found == std::end(other_options) ? nullptr : &*found;
+}
+
+std::vector<std::string> named_columns(const NamedColumns& named, std::string_view option) {
+  const auto found = named.find(option);
+  return found == named.end() ? std::vector<std::string>() : found->second;
+}
+
+std::vector<Trend> trends_of(const NamedColumns& named, const std::vector<std::string>& inputs,
+                             const std::vector<std::vector<std::string>>& levels) {
+  const std::vector<int> monotone = report::signs_of("--monotone", named_columns(named, "--monotone"), inputs);
+  const std::vector<int> slopes = report::signs_of("--slope-sign", named_columns(named, "--slope-sign"), inputs);
+  if (monotone.empty() && slopes.empty()) return {};
+  std::vector<Trend> trends(inputs.size(), Trend::any);
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
+    const int of_prediction = monotone.empty() ? 0 : monotone[j];
+    const int of_slopes = slopes.empty() ? 0 : slopes[j];
+    if ((of_prediction != 0 || of_slopes != 0) && !levels[j].empty()) {
+      throw std::invalid_argument(fmt::format("{} names \"{}\", which is categorical",
+                                              of_prediction != 0 ? "--monotone" : "--slope-sign", inputs[j]));
     }
-    if (std::ranges::find(names, texts.back()) != names.end()) return true;
-    throw std::invalid_argument(fmt::format("{} is \"{}\"{}, it must be one of {}", name, texts.back(),
-                                            did_you_mean(texts.back(), names), list_names<Enum>()));
-  };
-  const std::string type = list_names<Enum>("|");
-  return add_text(command, name, type.c_str(), take, fmt::format("{} [{}]", help, name_of(value)), {});
+    if (of_prediction * of_slopes < 0) {
+      throw std::invalid_argument(
+          fmt::format("--monotone and --slope-sign name \"{}\" with opposite signs", inputs[j]));
+    }
+    if (of_slopes != 0) trends[j] = of_slopes > 0 ? Trend::rising_slopes : Trend::falling_slopes;
+    if (of_prediction != 0) trends[j] = of_prediction > 0 ? Trend::rising : Trend::falling;
+  }
+  return trends;
 }
 
 // "Growth rule: rd (best split by F test), ...".
 std::string rules_text() {
   std::string text;
   for (const Choice<GrowthRule>& choice : choices<GrowthRule>()) {
-    text += fmt::format("{}{} ({})", text.empty() ? "Growth rule: " : ", ", choice.name, summary_of(choice.value));
+    text += fmt::format("{}{} ({})", text.empty() ? ": " : ", ", choice.name, summary_of(choice.value));
   }
   return text;
 }
 
-void add_growth(CLI::App& command, FitOptions& options) {
-  const auto expert = [](CLI::Option* option) { option->group(expert_options); };
-  expert(add_choice(command, "--rule", options.rule, rules_text()));
-  expert(add_number(
-      command, "--significance", options.significance, any_share,
-      fmt::format("rd, ra: of the F test, over all candidate splits; 1: no test [{}]", default_text("significance"))));
-  expert(add_choice(command, "--search", options.expert.search,
-                    "Search for splits: exact; by bins, exact in small nodes and where bins may hold a better split; "
-                    "or bins for many rows"));
-  expert(command.add_flag("--shared", options.shared_partition, "One tree for all targets instead of one each"));
-}
-
-void add_local_models(CLI::App& command, FitOptions& options) {
-  add_choice(command, "--validity", options.validity,
-             "How leaves meet: crisp at their borders, in blends over the splits, as Gaussians, or the better of the "
-             "first two");
-  add_choice(command, "--local-models", options.terms,
-             "Local models linear, with products and squares of the inputs, or the better of the two");
-  add_loss(command, options.loss);
-  add_choice(command, "--sparse", options.sparse,
-             "Local models keep only the slopes that forward selection takes: never, always, or where the held-out "
-             "error says so")
-      ->group(expert_options);
-  add_choice(command, "--estimation", options.expert.estimation,
-             "Local models as grown, weighted by validity, or all at once")
-      ->group(expert_options);
-}
-
-// Lists, of which the held-out error chooses an entry.
-void add_candidates(CLI::App& command, ExpertOptions& expert) {
-  const auto add = [&](const char* name, std::vector<double>& values, const NumberRange& range, const char* help,
-                       std::string_view defaults) {
-    add_numbers(command, name, values, range, fmt::format("{} [{}]", help, default_text(defaults)))
-        ->group(expert_options);
-  };
-  add("--width", expert.widths, above_zero,
-      "Widths to choose from. Of a transition of a blend, as a share of the smaller child's extent; k_sigma of "
-      "Gaussians; of the gates of hilomot",
-      "widths");
-  add("--jump", expert.jumps, threshold_or_inf,
-      "Jumps to choose from: a split where the output jumps by this many standard deviations has no transition",
-      "jumps");
-  add("--ridge", expert.ridges, not_negative,
-      "Ridges to choose from: how firmly local models that are estimated together are held near those that are "
-      "estimated one by one",
-      "ridges");
-  add("--shrinkage", expert.shrinkages, not_negative,
-      "Shrinkages to choose from: how firmly a local model is held near that of its parent, as a number of rows that "
-      "would say the same",
-      "shrinkages");
-}
-
 }  // namespace
 
-void add_loss(CLI::App& command, Loss& loss) {
-  add_choice(command, "--loss", loss,
-             "What is made small: squares of the residuals, or squares with rows far from a preliminary tree left "
-             "out (Tukey's biweight)");
+std::string FieldOptions::help(const OptionField& field) {
+  std::string text(field.help);
+  if (field.name == "rule") text += rules_text();
+  if (!field.has_default_text) return text;
+  const std::string_view option = field.name.substr(field.name.find('.') + 1);
+  return fmt::format("{} [{}]", text, default_text(option));
 }
 
-void add_fit_options(CLI::App& command, FitOptions& options) {
-  add_growth(command, options);
-  add_local_models(command, options);
-  add_candidates(command, options.expert);
+void FieldOptions::group(const OptionField& field, CLI::Option* option) {
+  if (field.audience == Audience::experts) option->group(expert_options);
+}
+
+void FieldOptions::add_flag(const OptionField& field, const std::function<void()>& set) const {
+  group(field, command_.add_flag_callback(flag(field), set, help(field)));
+}
+
+void FieldOptions::add_columns(const OptionField& field, const std::string& name, const std::string& help) const {
+  group(field, add_names(command_, name, columns_[name], "COLUMN", help));
+}
+
+void FieldOptions::add_names_of_choice(const OptionField& field, const std::vector<std::string>& names,
+                                       std::string_view by_default,
+                                       const std::function<void(std::size_t)>& take) const {
+  const auto read = [name = flag(field), names, take](const CLI::results_t& texts) {
+    const auto found = std::ranges::find(names, texts.back());
+    if (found == names.end()) {
+      throw std::invalid_argument(fmt::format("{} is \"{}\"{}, it must be one of {}", name, texts.back(),
+                                              did_you_mean(texts.back(), names), fmt::join(names, ", ")));
+    }
+    take(found - names.begin());
+    return true;
+  };
+  const std::string type = fmt::format("{}", fmt::join(names, "|"));
+  group(field,
+        add_text(command_, flag(field), type.c_str(), read, fmt::format("{} [{}]", help(field), by_default), {}));
+}
+
+void set_columns(const NamedColumns& named, const std::vector<std::string>& inputs,
+                 const std::vector<std::vector<std::string>>& levels, FitOptions& options) {
+  for_each_field(options, [&](const OptionField& field, auto& value) {
+    using Value = std::remove_cvref_t<decltype(value)>;
+    if constexpr (std::same_as<Value, std::vector<int>>) {
+      value = report::positions_of(std::string(field.flag), named_columns(named, field.flag), inputs);
+    } else if constexpr (std::same_as<Value, std::vector<Trend>>) {
+      value = trends_of(named, inputs, levels);
+    }
+  });
+}
+
+void refuse_options(const CLI::App& command, const FormOfFit& form) {
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() == 0) continue;
+    const std::string name = option->get_single_name();
+    const OptionField* field = field_of(name);
+    const bool is_refused = field != nullptr ? form.use != nullptr && (field->*form.use).is_refused()
+                                             : other_option(name)->forms.find(form.name) == std::string_view::npos;
+    if (is_refused) throw std::invalid_argument(fmt::format("--{} {}", name, form.sentence));
+  }
+}
+
+void require_forms(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options()) {
+    const std::string name = option->get_single_name();
+    if (field_of(name) == nullptr && other_option(name) == nullptr) {
+      throw std::logic_error(fmt::format("option --{} has no entry that says which forms of fit take it", name));
+    }
+  }
 }
 
 }  // namespace llmt::apps

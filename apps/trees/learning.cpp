@@ -156,29 +156,6 @@ std::vector<std::string> choose_inputs(const std::vector<std::string>& columns, 
   return choose_inputs(csv, arguments);
 }
 
-std::vector<Trend> trends_of(const LearningArguments& arguments, const std::vector<std::string>& inputs,
-                             const std::vector<std::vector<std::string>>& levels) {
-  const std::vector<int> monotone = report::signs_of("--monotone", arguments.monotone, inputs);
-  const std::vector<int> slopes = report::signs_of("--slope-sign", arguments.slope_signs, inputs);
-  if (monotone.empty() && slopes.empty()) return {};
-  std::vector<Trend> trends(inputs.size(), Trend::any);
-  for (std::size_t j = 0; j < inputs.size(); ++j) {
-    const int of_prediction = monotone.empty() ? 0 : monotone[j];
-    const int of_slopes = slopes.empty() ? 0 : slopes[j];
-    if ((of_prediction != 0 || of_slopes != 0) && !levels[j].empty()) {
-      throw std::invalid_argument(fmt::format("{} names \"{}\", which is categorical",
-                                              of_prediction != 0 ? "--monotone" : "--slope-sign", inputs[j]));
-    }
-    if (of_prediction * of_slopes < 0) {
-      throw std::invalid_argument(
-          fmt::format("--monotone and --slope-sign name \"{}\" with opposite signs", inputs[j]));
-    }
-    if (of_slopes != 0) trends[j] = of_slopes > 0 ? Trend::rising_slopes : Trend::falling_slopes;
-    if (of_prediction != 0) trends[j] = of_prediction > 0 ? Trend::rising : Trend::falling;
-  }
-  return trends;
-}
-
 namespace {
 
 std::vector<Eigen::Index> lines_of_rows(const Csv& csv) {
@@ -208,10 +185,7 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
   look_for_nothing_to_learn(csv, arguments, columns);
   LearningTable table{nullptr, arguments.options, lines_of_rows(csv)};
   FitOptions& options = table.options;
-  options.split_inputs = report::positions_of("--split-inputs", arguments.split_inputs, inputs);
-  options.regression_inputs = report::positions_of("--regression-inputs", arguments.regression_inputs, inputs);
-  options.trends = trends_of(arguments, inputs, columns.inputs.levels);
-  options.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
+  set_columns(arguments.columns, inputs, columns.inputs.levels, options);
   TrainingData data{.inputs = std::move(columns.inputs.values), .outputs = std::move(columns.targets)};
   data.weights = std::move(columns.weights);
   data.levels = std::move(columns.inputs.levels);
@@ -223,11 +197,6 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
 }
 
 void add_learning_options(CLI::App& command, LearningArguments& arguments) {
-  FitOptions& options = arguments.options;
-  const auto expert = [](CLI::Option* option) { option->group(expert_options); };
-  const auto by_default = [](const char* help, std::string_view option) {
-    return fmt::format("{} [{}]", help, default_text(option));
-  };
   add_input_file(command, "data", arguments.data, "CSV file with a header row; - is standard input")->required();
   add_names(command, "-t,--target", arguments.targets, "COLUMN", "What to predict (required)");
   add_names(command, "--inputs", arguments.inputs, "COLUMN", "What to learn from [all but targets and ignored]");
@@ -237,35 +206,11 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_option("--weight", arguments.weight, "The weights of the rows [1 for each]")->type_name("COLUMN");
   add_decimal_comma(command, arguments.mark);
   add_thousands(command, arguments.thousands);
-  add_count(command, "--cv", options.folds.count, 0,
-            "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
-      ->capture_default_str();
-  command.add_flag("--contiguous", arguments.contiguous,
-                   "Folds are blocks of consecutive rows (measured paths, grids, time series)");
-  add_count(command, "--max-leaves", options.max_leaves, Eigen::Index{0}, "Most leaves of a tree; 0: the default")
-      ->default_str(default_text("max_leaves"));
-  add_threads(command, options.max_threads);
-  expert(add_names(command, "--split-inputs", arguments.split_inputs, "COLUMN", "Inputs that may be split [all]"));
-  expert(add_names(command, "--regression-inputs", arguments.regression_inputs, "COLUMN",
-                   "Inputs of the local models [all]"));
-  expert(command.add_flag_callback(
-      "--all-inputs", [&options] { options.choose_inputs = false; },
-      "Keep inputs that do not lower the held-out error"));
-  expert(command.add_flag_callback(
-      "--no-codes", [&arguments] { arguments.may_have_codes = false; },
-      "Do not take inputs of few whole numbers for categories where that lowers the held-out error"));
-  expert(add_names(command, "--monotone", arguments.monotone, "COLUMN",
-                   "Inputs with which the prediction never falls, or with a leading minus never rises "
-                   "(--monotone=-x)"));
-  expert(add_names(command, "--slope-sign", arguments.slope_signs, "COLUMN",
-                   "Inputs with slopes >= 0, or with a leading minus <= 0, in every local model; not across leaves"));
-  expert(add_count(command, "--min-leaf", options.min_leaf_samples, Eigen::Index{0},
-                   by_default("Fewest rows in a leaf; 0: the default", "min_leaf_samples")));
-  expert(command.add_flag_callback(
-      "--prune", [&options] { options.pruning = Pruning::weakest_link; },
-      "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better"));
-  expert(add_seed(command, options.folds.seed,
-                  "Of the random folds; with --boost, of the held-out rows and of the features looked at"));
+  command
+      .add_flag_callback(
+          "--no-codes", [&arguments] { arguments.may_have_codes = false; },
+          "Do not take inputs of few whole numbers for categories where that lowers the held-out error")
+      ->group(expert_options);
 }
 
 }  // namespace llmt::apps

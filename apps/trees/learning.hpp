@@ -10,6 +10,7 @@
 #include "llmt/fit.hpp"
 #include "llmt/outliers.hpp"
 #include "report/table/columns.hpp"
+#include "trees/fit_options.hpp"
 
 namespace llmt::apps {
 
@@ -19,18 +20,15 @@ struct LearningArguments {
   std::vector<std::string> inputs;
   std::vector<std::string> ignored;
   std::vector<std::string> categorical;
-  std::vector<std::string> split_inputs;
-  std::vector<std::string> regression_inputs;
-  std::vector<std::string> monotone;  ///< a leading minus: falling
-  std::vector<std::string> slope_signs;
   std::string weight;
-  bool contiguous = false;
   bool may_have_codes = true;  ///< see TrainingData
   DecimalMark mark = DecimalMark::point;
   bool thousands = false;
-  FitOptions options;
+  FitOptions options;    ///< those that are columns are filled in when the table is read
+  NamedColumns columns;  ///< of these options
 };
 
+/// Adds what says which table and columns are learned from.
 void add_learning_options(CLI::App& command, LearningArguments& arguments);
 
 /// Throws std::invalid_argument that lists the columns of the table if no target is named, and as read_table().
@@ -43,11 +41,6 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
 /// The same for a table of which only the columns and the name are known.
 std::vector<std::string> choose_inputs(const std::vector<std::string>& columns, const std::string& name,
                                        const LearningArguments& arguments);
-
-/// What --monotone and --slope-sign ask for, one entry an input; none if they ask for nothing. `levels`: of the inputs,
-/// none for numbers.
-std::vector<Trend> trends_of(const LearningArguments& arguments, const std::vector<std::string>& inputs,
-                             const std::vector<std::vector<std::string>>& levels);
 
 /// The table as the learner takes it, and the options with its columns filled in.
 struct LearningTable {

@@ -1,33 +1,17 @@
+#include <vector>
+
+#include "llmt/option_fields.hpp"
 #include "shared/cli.hpp"
 #include "trees/commands.hpp"
 
 namespace {
 
-// Of FitOptions, in the messages of llmt::fit() and llmt::compare().
-constexpr llmt::apps::SettingName setting_names[] = {
-    {"folds.count", "--cv"},
-    {"folds.seed", "--seed"},
-    {"max_leaves", "--max-leaves"},
-    {"min_leaf_samples", "--min-leaf"},
-    {"max_threads", "--threads"},
-    {"split_inputs", "--split-inputs"},
-    {"regression_inputs", "--regression-inputs"},
-    {"trends", "--monotone or --slope-sign"},
-    {"pruning", "--prune"},
-    {"shared_partition", "--shared"},
-    {"significance", "--significance"},
-    {"terms", "--local-models"},
-    {"sparse", "--sparse"},
-    {"validity", "--validity"},
-    {"rule", "--rule"},
-    {"loss", "--loss"},
-    {"expert.search", "--search"},
-    {"expert.estimation", "--estimation"},
-    {"expert.widths", "--width"},
-    {"expert.jumps", "--jump"},
-    {"expert.ridges", "--ridge"},
-    {"expert.shrinkages", "--shrinkage"},
-};
+// How the messages of llmt::fit() and llmt::compare() name options, and how the program does.
+std::vector<llmt::apps::SettingName> setting_names() {
+  std::vector<llmt::apps::SettingName> names;
+  for (const llmt::OptionField& field : llmt::option_fields()) names.push_back({field.name, field.flag});
+  return names;
+}
 
 }  // namespace
 
@@ -44,5 +28,5 @@ int main(int argc, char** argv) {
   llmt::apps::add_table(app);
   llmt::apps::add_discover(app);
   llmt::apps::add_export(app);
-  return llmt::apps::run(app, argc, argv, setting_names);
+  return llmt::apps::run(app, argc, argv, setting_names());
 }

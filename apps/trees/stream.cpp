@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -12,7 +11,6 @@
 #include <iostream>
 #include <memory>
 #include <stdexcept>
-#include <string_view>
 
 #include "llmt/csv.hpp"
 #include "report/stream/stream_summary.hpp"
@@ -34,33 +32,6 @@ struct Learned {
 };
 
 constexpr std::size_t piece_bytes = 1 << 20;
-
-void refuse_other_options(const CLI::App& command) {
-  constexpr std::array<std::string_view, 15> taken = {
-      "data",     "target",    "inputs",       "ignore", "weight", "min-leaf",      "max-leaves", "stream",
-      "validity", "shrinkage", "significance", "output", "json",   "decimal-comma", "thousands"};
-  for (const CLI::Option* option : command.get_options()) {
-    const std::string name = option->get_single_name();
-    if (option->count() > 0 && std::ranges::find(taken, name) == taken.end()) {
-      throw std::invalid_argument(fmt::format("--{} is not for --stream", name));
-    }
-  }
-}
-
-StreamOptions options_of(const CLI::App& command, const StreamArguments& arguments) {
-  const FitOptions& fit = arguments.learning.options;
-  StreamOptions options{.min_leaf_samples = fit.min_leaf_samples, .max_leaves = fit.max_leaves};
-  if (command.count("--significance") > 0) {
-    options.significance = fit.significance;
-  }
-  if (fit.expert.shrinkages.size() > 1) {
-    throw std::invalid_argument("--shrinkage takes one number with --stream");
-  }
-  if (fit.expert.shrinkages.size() == 1) {
-    options.shrinkage = fit.expert.shrinkages.front();
-  }
-  return options;
-}
 
 // Rows so far and the running errors, on one line that is rewritten, where stderr is a terminal.
 void show_progress(const Stream& stream) {
@@ -114,9 +85,9 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
   look_at(piece, targets, learned.largest_targets);
 }
 
-Learned learn(const CLI::App& command, const StreamArguments& arguments) {
-  const StreamOptions options = options_of(command, arguments);
+Learned learn(const StreamArguments& arguments) {
   const LearningArguments& learning = arguments.learning;
+  const StreamOptions options = stream_options(learning.options);
   const bool standard_input = learning.data == "-";
   Learned learned{table_name(learning.data), {}, nullptr, {}, {}};
   std::ifstream file;
@@ -161,13 +132,10 @@ Model snapshot(const Learned& learned, ValidityChoice validity) {
 }  // namespace
 
 void stream_command(const CLI::App& command, const StreamArguments& arguments) {
-  refuse_other_options(command);
-  const ValidityChoice validity = arguments.learning.options.validity;
-  if (validity == ValidityChoice::gaussian) {
-    throw std::invalid_argument("--validity gaussian is not for --stream");
-  }
-  const Learned learned = learn(command, arguments);
-  const Model model = snapshot(learned, validity).named(learned.inputs, arguments.learning.targets);
+  refuse_options(command, streaming);
+  const Learned learned = learn(arguments);
+  const Model model =
+      snapshot(learned, arguments.learning.options.validity).named(learned.inputs, arguments.learning.targets);
   if (!arguments.output.empty()) {
     save(model, arguments.output);
   }

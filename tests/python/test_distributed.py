@@ -62,7 +62,7 @@ def test_a_table_that_fits_becomes_the_model_of_fit():
 def test_what_does_not_go_is_named():
     X, y = table()
     state = started(600)
-    with pytest.raises(ValueError, match="growth rule"):
+    with pytest.raises(ValueError, match="rule m5 is not possible beyond one memory; take rd"):
         begin(rule="m5")
     with pytest.raises(ValueError, match="monotonic_cst"):
         begin(monotonic_cst={"a": 1})

@@ -27,13 +27,14 @@ nb::bytes bytes_of(const std::string& text) { return nb::bytes(text.data(), text
 
 nb::bytes start(std::vector<std::string> input_names, std::string output_name, Eigen::Index branch_rows,
                 Eigen::Index sample_rows, Eigen::Index block_rows, bool weighted,
-                std::vector<std::vector<std::string>> levels, const Options& options) {
+                std::vector<std::vector<std::string>> levels, bool may_have_codes, const Options& options) {
   const distributed::Options given{.branch_rows = branch_rows,
                                    .sample_rows = sample_rows,
                                    .block_rows = block_rows,
                                    .weighted = weighted,
                                    .levels = std::move(levels),
-                                   .fit = options_of(options)};
+                                   .fit = options_of(options),
+                                   .may_have_codes = may_have_codes};
   return bytes_of(distributed::start(std::move(input_names), std::move(output_name), given).to_bytes());
 }
 
@@ -92,7 +93,8 @@ nb::dict status(const nb::bytes& bytes) {
 
 void add_distributed(nb::module_& module) {
   module.def("distributed_start", &start, nb::arg("input_names"), nb::arg("output_name"), nb::arg("branch_rows"),
-             nb::arg("sample_rows"), nb::arg("block_rows"), nb::arg("weighted"), nb::arg("levels"), nb::arg("options"));
+             nb::arg("sample_rows"), nb::arg("block_rows"), nb::arg("weighted"), nb::arg("levels"),
+             nb::arg("may_have_codes"), nb::arg("options"));
   module.def("distributed_sums", &sums, nb::arg("state"), nb::arg("inputs"), nb::arg("output"), nb::arg("first_block"),
              nb::arg("max_threads"), nb::arg("weights").none());
   module.def("distributed_merge", &merge, nb::arg("parts"));

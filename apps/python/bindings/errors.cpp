@@ -8,7 +8,9 @@
 #include <regex>
 #include <stdexcept>
 
+#include "llmt/option_fields.hpp"
 #include "llmt/progress.hpp"
+#include "python/bindings/options.hpp"
 
 namespace llmt::python {
 namespace {
@@ -49,6 +51,8 @@ void translate(const std::exception_ptr& thrown, void* /*payload*/) {
     PyErr_SetString(PyExc_InterruptedError, error.what());
   } catch (const std::runtime_error& error) {
     PyErr_SetString(PyExc_ValueError, in_words_of_python(error.what()).c_str());
+  } catch (const OptionRefused& error) {
+    PyErr_SetString(PyExc_ValueError, (parameter_of(error.option()) + error.rest()).c_str());
   } catch (const std::invalid_argument& error) {
     PyErr_SetString(PyExc_ValueError, in_words_of_python(error.what()).c_str());
   }

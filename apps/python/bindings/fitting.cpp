@@ -186,7 +186,7 @@ std::tuple<std::vector<Eigen::Index>, double, bool> dominant(const Vector& outpu
 void add_stream(nb::module_& module) {
   nb::class_<Stream>(module, "Stream", "A tree that learns from rows as they come.")
       .def(nb::new_([](Eigen::Index inputs, Eigen::Index outputs, const Options& options) {
-        return Stream(inputs, outputs, stream_options_of(options));
+        return Stream(inputs, outputs, stream_options(options_of(options)));
       }))
       .def_static("from_json", [](const std::string& text) { return stream_from_json(text); })
       .def("to_json", [](const Stream& self) { return to_json(self); })
@@ -211,10 +211,10 @@ void add_stream(nb::module_& module) {
              const Eigen::VectorXd rmse = self.prequential_rmse();
              return std::vector<double>(rmse.begin(), rmse.end());
            })
-      .def("model",
-           [](const Stream& self, const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
-             return to_json(self.snapshot().named(inputs, outputs));
-           });
+      .def("model", [](const Stream& self, const std::vector<std::string>& inputs,
+                       const std::vector<std::string>& outputs, const std::string& validity) {
+        return to_json(self.snapshot(parse<ValidityChoice>(validity)).named(inputs, outputs));
+      });
 }
 
 }  // namespace

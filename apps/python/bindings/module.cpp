@@ -34,6 +34,7 @@ NB_MODULE(_core, module) {
   llmt::python::add_distributed(module);
   llmt::python::add_fitting(module);
   llmt::python::add_found(module);
+  llmt::python::add_options(module);
   llmt::python::add_signals(module);
   llmt::python::add_terms(module);
   llmt::python::add_words(module);

@@ -12,6 +12,7 @@ void add_distributed(nanobind::module_& module);
 void add_fitting(nanobind::module_& module);
 void add_found(nanobind::module_& module);
 void add_models(nanobind::module_& module);
+void add_options(nanobind::module_& module);
 void add_signals(nanobind::module_& module);
 void add_terms(nanobind::module_& module);
 void add_words(nanobind::module_& module);

@@ -14,6 +14,13 @@ from ._regressor import FitRows, TableRegressor, check_rows, count, names_of, sp
 from ._tree_views import TreeViews
 from .tables import Table, read_table, read_targets
 
+# Parameters that are no options of a fit (option_fields.hpp) and that fit() alone takes: what to do beyond one memory.
+_of_fit_alone = {
+    "categorical_features": "name their categories by levels",
+    "readable": "fit a sample that fits into memory",
+    "teach": "fit a sample that fits into memory",
+}
+
 _choices = {
     "rule": ("rd", "retis", "ra", "m5", "lolimot", "lolimot-data", "hilomot"),
     "validity": ("auto", "crisp", "blend", "gaussian"),
@@ -147,7 +154,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         labels = rows.groups
         options = self._options(rows.table)
         if not isinstance(self.cv, (int, np.integer)) and not rows.held_out:
-            options["folds"], labels = _given_folds(self.cv, *rows.given, rows.fitted)
+            options["folds.count"], labels = _given_folds(self.cv, *rows.given, rows.fitted)
         with Bar() as bar:
             fitted = _core.fit(
                 rows.table.values,
@@ -182,7 +189,12 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         """Learns from further rows as they come, in memory that does not depend on their number.
 
         The tree is grown by a stream's rules (docs/algorithms), not by `fit`; a call after `fit` starts anew. Inputs
-        are numbers. Parameters that are not for streams are not used.
+        are numbers. Of the parameters a stream takes `max_leaves`, `min_samples_leaf` and `validity`.
+
+        Raises
+        ------
+        ValueError
+            For rows that cannot be learned from, and for a parameter that was given and that a stream does not take.
         """
         stream: StreamModel | None = getattr(self, "_stream", None)
         if stream is not None:
@@ -201,11 +213,10 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
             self._inputs = names_of(table)
             self._outputs = names or target_names(self.n_outputs_)
             self._levels = table.levels
-            options = {
-                "max_leaves": count("max_leaves", self.max_leaves),
-                "min_leaf_samples": count("min_samples_leaf", self.min_samples_leaf),
-            }
-            stream = self._stream = StreamModel(self.n_features_in_, self.n_outputs_, options)
+            for name in _of_fit_alone:
+                if getattr(self, name):
+                    raise ValueError(f"{name} is not for streams")
+            stream = self._stream = StreamModel(self.n_features_in_, self.n_outputs_, self._options())
         outputs = outputs.reshape(len(outputs), -1)
         if outputs.shape[1] != self.n_outputs_:
             raise ValueError(f"y has {outputs.shape[1]} targets, the rows before had {self.n_outputs_}")
@@ -233,7 +244,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         return self
 
     def _take_stream(self, stream: StreamModel) -> None:
-        self.model_ = Model(stream.handle.model(self._inputs, self._outputs))
+        self.model_ = Model(stream.handle.model(self._inputs, self._outputs, self.validity))
         self.summary_ = {"rows": stream.handle.rows(), "rmse": stream.handle.prequential_rmse()}
         self._fit = self._mean = None
         self._is_readable = False
@@ -258,31 +269,36 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
             return None
         return 0.15 if self.readable is True else float(self.readable)
 
-    def _options(self, table: Table) -> dict[str, Any]:
-        options = self._options_without_columns()
-        if self.monotonic_cst is not None:
-            options["trends"] = _signs(self.monotonic_cst, self._inputs, table)
-        return options
-
-    def _options_without_columns(self) -> dict[str, Any]:
+    def _options(self, table: Table | None = None) -> dict[str, Any]:
+        """The options of a fit by the library's names. Without a table, signs are those of no particular columns."""
         for name, choices in _choices.items():
             if getattr(self, name) not in choices:
                 raise ValueError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(choices)}")
-        return {
+        if not isinstance(self.cv, (int, np.integer)) and self.contiguous:
+            raise ValueError("contiguous is for a number of folds; here cv deals the rows itself")
+        values = {
             "max_leaves": count("max_leaves", self.max_leaves),
-            "min_leaf_samples": count("min_samples_leaf", self.min_samples_leaf),
+            "min_samples_leaf": count("min_samples_leaf", self.min_samples_leaf),
             "rule": self.rule,
             "validity": self.validity,
-            "terms": self.local_models,
+            "local_models": self.local_models,
             "sparse": self.sparse,
             "loss": self.loss,
-            "folds": _folds(self.cv),
-            "contiguous": bool(self.contiguous),
-            "seed": self._seed(),
-            "choose_inputs": bool(self.select_features),
-            "shared_partition": bool(self.shared_tree),
-            "max_threads": self._threads(),
+            "cv": _folds(self.cv),
+            "contiguous": "contiguous" if self.contiguous else "random",
+            "random_state": self._seed(),
+            "select_features": bool(self.select_features),
+            "shared_tree": bool(self.shared_tree),
+            "monotonic_cst": self._trends(table),
+            "n_jobs": self._threads(),
         }
+        return {field["name"]: values[field["parameter"]] for field in _core.fit_fields() if field["parameter"]}
+
+    def _trends(self, table: Table | None) -> list[str]:
+        if self.monotonic_cst is None:
+            return []
+        signs = [1] if table is None else _signs(self.monotonic_cst, self._inputs, table)
+        return [{-1: "falling", 0: "any", 1: "rising"}[sign] for sign in signs]
 
 
 def _given_folds(cv: Any, X: Any, y: Any, groups: Any, rows: int) -> tuple[int, np.ndarray]:

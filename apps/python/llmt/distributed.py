@@ -25,18 +25,12 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._estimator import LocalLinearTreeRegressor
+from ._estimator import LocalLinearTreeRegressor, _of_fit_alone
 from ._model import Model
 from ._progress import Bar
 from .tables import read_table, read_targets
 
 __all__ = ["advance", "estimator", "merge", "start", "status", "sums"]
-
-_refused = {
-    "categorical_features": "name their categories by levels",
-    "monotonic_cst": "fit a sample that fits into memory",
-    "readable": "fit a sample that fits into memory",
-}
 
 
 def start(
@@ -60,7 +54,8 @@ def start(
     branch_rows : int
         Branches of the tree with at most this number of rows are brought into one memory and fitted there. A table
         that has no more rows becomes the model of `LocalLinearTreeRegressor.fit`, to the byte. No fewer than
-        `sample_rows`.
+        `sample_rows`. In larger tables no number is taken for a code, and
+        only the tree of the sample leaves out inputs.
     sample_rows : int
         Rows of the sample that the first pass brings into one memory: a first tree is grown from it.
     block_rows : int
@@ -70,7 +65,7 @@ def start(
     weighted : bool
         Whether rows have weights.
     estimator : LocalLinearTreeRegressor, optional
-        Its parameters are those of the fit.
+        Its parameters are those of the fit, but for `n_jobs`: `sums` and `advance` have threads of their own.
 
     Raises
     ------
@@ -78,7 +73,7 @@ def start(
         For parameters that are not possible beyond one memory, by their names.
     """
     given = LocalLinearTreeRegressor() if estimator is None else estimator
-    for name, instead in _refused.items():
+    for name, instead in _of_fit_alone.items():
         if getattr(given, name):
             raise ValueError(f"{name} is not possible beyond one memory; {instead}")
     if not isinstance(given.cv, int):
@@ -90,8 +85,8 @@ def start(
             raise ValueError(f'levels has "{name}", which is no input; the inputs are {", ".join(names)}')
     of_inputs = [by_name.get(name, []) for name in names]
     memory = (branch_rows, sample_rows, block_rows)
-    options = given._options_without_columns()
-    return _core.distributed_start(names, str(target), *memory, weighted, of_inputs, options)
+    codes = bool(given.integer_codes)
+    return _core.distributed_start(names, str(target), *memory, weighted, of_inputs, codes, given._options())
 
 
 def sums(

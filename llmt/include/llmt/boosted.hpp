@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "llmt/abi.hpp"
@@ -34,6 +35,18 @@ struct BoostOptions {
   int max_threads = 0;       ///< 0: all that the machine has. The result does not depend on it
   bool mean_of_few = false;  ///< of fewer than `fewest_boosted_rows` different rows: their mean, in place of an error
 };
+
+/// Calls visit(name, member) for every option. `Options`: BoostOptions or const BoostOptions.
+template <class Options, class Visitor>
+requires std::is_same_v<std::remove_const_t<Options>, BoostOptions>
+void for_each_field(Options& options, Visitor&& visit) {
+  auto& [rate, max_rounds, seed, max_threads, mean_of_few] = options;
+  visit("rate", rate);
+  visit("max_rounds", max_rounds);
+  visit("seed", seed);
+  visit("max_threads", max_threads);
+  visit("mean_of_few", mean_of_few);
+}
 
 /// A variant of the trees that was compared on held-out rows: with all its trees, or after 50 rounds. From 5000 rows on
 /// they are compared after 50 rounds. If one tree is tried then, the sum with all its trees and the one tree come last.

@@ -41,8 +41,10 @@ struct Options {
   /// 255, in all of the table. No names: a number. Empty: all are numbers.
   std::vector<std::vector<std::string>> levels = {};
   /// Of the branches. What start() refuses is not possible beyond one memory; max_threads may differ from pass to pass
-  /// and is not kept.
+  /// and is not kept. OptionField::beyond_memory says which options are taken.
   FitOptions fit = {};
+  /// TrainingData::may_have_codes of a table with no more rows than branch_rows. Larger tables have no codes.
+  bool may_have_codes = true;
 };
 
 /// Some rows of the table. They make the blocks first_block, first_block + 1, ... of Options::block_rows rows each; the
@@ -145,8 +147,9 @@ class Sums {
 };
 
 /// The state before the first pass. Throws std::invalid_argument naming argument, value and bound: no input, repeated
-/// names, an option of fit() out of range. What sums cannot do is refused by the option's name, with what to do:
-/// growth rules other than rd, exact search, quadratic local models, trends, Gaussians, Tukey's loss, lists of inputs.
+/// names, an option of fit() out of range. Throws OptionRefused (option_fields.hpp), which names the option and says
+/// what to do, for growth rules other than rd, exact search, quadratic local models, trends, Gaussians, Tukey's loss
+/// and lists of inputs.
 State start(std::vector<std::string> input_names, std::string output_name, const Options& options = {});
 
 /// The sums that `state` asks of these rows: over each block in the order of its rows, then over blocks as a fixed

@@ -19,8 +19,8 @@ struct Choice {
   std::string_view name;
 };
 
-/// All values of an enumeration, in the order in which help lists them. There is one for GrowthRule, ValidityChoice,
-/// LocalTerms, SparseChoice, SplitSearch, Estimation (options.hpp) and ValidityKind (model.hpp).
+/// All values of an enumeration, in the order in which help lists them. They are defined for the enumerations of
+/// options.hpp, for ValidityKind (model.hpp) and for distributed::Step.
 template <class Enum>
 std::span<const Choice<Enum>> choices();
 

@@ -144,7 +144,7 @@ struct ExpertOptions {
   std::vector<double> shrinkages = {};
 };
 
-/// The options of a fit. Column indices count from 0.
+/// The options of a fit. Column indices count from 0. A further member needs an entry in option_fields.hpp.
 struct FitOptions {
   GrowthRule rule = GrowthRule::rd;
   Eigen::Index max_leaves = 0;        ///< largest number of leaves of a tree; 0: see default_text()
@@ -204,5 +204,11 @@ template <>
 std::span<const Choice<Estimation>> choices();
 template <>
 std::span<const Choice<Loss>> choices();
+template <>
+std::span<const Choice<Pruning>> choices();
+template <>
+std::span<const Choice<FoldKind>> choices();
+template <>
+std::span<const Choice<Trend>> choices();
 
 }  // namespace llmt

@@ -6,8 +6,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <type_traits>
 
 #include "llmt/abi.hpp"
+#include "llmt/options.hpp"
 
 namespace llmt {
 
@@ -31,6 +33,25 @@ struct StreamOptions {
 
   bool operator==(const StreamOptions&) const = default;
 };
+
+/// Calls visit(name, member) for every option. `Options`: StreamOptions or const StreamOptions.
+template <class Options, class Visitor>
+requires std::is_same_v<std::remove_const_t<Options>, StreamOptions>
+void for_each_field(Options& options, Visitor&& visit) {
+  auto& [significance, min_variance_gain, min_leaf_samples, max_leaves, bins, shrinkage, reservoir_rows] = options;
+  visit("significance", significance);
+  visit("min_variance_gain", min_variance_gain);
+  visit("min_leaf_samples", min_leaf_samples);
+  visit("max_leaves", max_leaves);
+  visit("bins", bins);
+  visit("shrinkage", shrinkage);
+  visit("reservoir_rows", reservoir_rows);
+}
+
+/// The options of a stream that is to learn as fit() would: min_leaf_samples, max_leaves, significance and one of
+/// expert.shrinkages. FitOptions::validity is taken too, by Stream::snapshot(). Throws OptionRefused
+/// (option_fields.hpp) for options that a stream does not take, and std::invalid_argument for several shrinkages.
+StreamOptions stream_options(const FitOptions& options);
 
 /// Counts of the rows, leaves and changes of a stream so far.
 struct StreamCounts {

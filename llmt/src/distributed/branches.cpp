@@ -114,10 +114,10 @@ void take_branches(StateData& data, std::map<Eigen::Index, BranchRows> rows, con
     TopNode& node = data.nodes[at];
     TrainingData branch = data_of(data, node, std::move(rows[at]));
     FitOptions options = branch_options(data.options, max_threads);
+    branch.may_have_codes = is_all && data.options.may_have_codes != 0;
     if (!is_all) {
       options.intervals = false;
       options.choose_inputs = false;
-      branch.may_have_codes = false;
     }
     Work part(work, 1.0 / static_cast<double>(data.asked.size()));
     const FitResult result =

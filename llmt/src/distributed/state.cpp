@@ -15,7 +15,7 @@ namespace llmt::distributed {
 namespace {
 
 constexpr std::string_view format = "LLMTSUMS";
-constexpr std::uint32_t version = 3;
+constexpr std::uint32_t version = 4;
 
 struct Header {
   char format[8];
@@ -110,14 +110,9 @@ void check_option(Eigen::Index value, Eigen::Index last) { require(value >= 0 &&
 void check_state(const StateData& data) {
   const KeptOptions& options = data.options;
   require(options.sample_rows > 0 && options.branch_rows >= options.sample_rows && options.block_rows > 0, "an option");
-  check_option(options.pruning, static_cast<Eigen::Index>(Pruning::weakest_link));
-  check_option(options.validity, static_cast<Eigen::Index>(ValidityChoice::blend));
-  check_option(options.sparse, static_cast<Eigen::Index>(SparseChoice::always));
-  check_option(options.estimation, static_cast<Eigen::Index>(Estimation::joint));
-  check_option(options.folds, std::numeric_limits<int>::max());
-  check_option(options.fold_kind, static_cast<Eigen::Index>(FoldKind::contiguous));
-  check_option(options.intervals, 1);
+  branch_options(options, 0);
   check_option(options.weighted, 1);
+  check_option(options.may_have_codes, 1);
   const Eigen::Index inputs = data.inputs();
   require(inputs > 0 && std::ssize(data.levels) == inputs, "the number of inputs");
   for (const std::vector<Text>& levels : data.levels) require(levels.size() <= most_levels, "the number of levels");

@@ -33,33 +33,17 @@ inline std::vector<std::string> to_strings(const std::vector<Text>& from) {
   return to;
 }
 
-/// Options that a branch may have, as numbers.
+/// The options of a fit as they are written.
 struct KeptOptions {
   Eigen::Index branch_rows = 0;
   Eigen::Index sample_rows = 0;  ///< no more than branch_rows
   Eigen::Index block_rows = 0;
-  Eigen::Index max_leaves = 0;
-  Eigen::Index min_leaf_samples = 0;
-  double significance = -1.0;
-  Eigen::Index pruning = 0;
-  Eigen::Index validity = 0;
-  Eigen::Index sparse = 0;
-  Eigen::Index estimation = 0;
-  Eigen::Index folds = 0;
-  Eigen::Index fold_kind = 0;
-  std::uint64_t seed = 0;
-  Eigen::Index intervals = 0;
   Eigen::Index weighted = 0;
-  std::vector<double> widths;
-  std::vector<double> jumps;
-  std::vector<double> ridges;
-  std::vector<double> shrinkages;
+  Eigen::Index may_have_codes = 0;
+  Text fit;  ///< of kept()
 
   static auto fields(auto& self) {
-    return std::tie(self.branch_rows, self.sample_rows, self.block_rows, self.max_leaves, self.min_leaf_samples,
-                    self.significance, self.pruning, self.validity, self.sparse, self.estimation, self.folds,
-                    self.fold_kind, self.seed, self.intervals, self.weighted, self.widths, self.jumps, self.ridges,
-                    self.shrinkages);
+    return std::tie(self.branch_rows, self.sample_rows, self.block_rows, self.weighted, self.may_have_codes, self.fit);
   }
 };
 

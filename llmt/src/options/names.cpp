@@ -1,6 +1,6 @@
 #include <array>
 
-#include "llmt/options.hpp"
+#include "llmt/option_fields.hpp"
 #include "llmt/summary.hpp"
 
 namespace llmt {
@@ -20,6 +20,15 @@ constexpr std::array<Choice<SplitSearch>, 3> searches = {
 constexpr std::array<Choice<Estimation>, 3> estimations = {
     {{Estimation::as_grown, "as-grown"}, {Estimation::local, "local"}, {Estimation::joint, "joint"}}};
 constexpr std::array<Choice<Loss>, 2> losses = {{{Loss::squared, "squared"}, {Loss::tukey, "tukey"}}};
+constexpr std::array<Choice<Pruning>, 2> prunings = {
+    {{Pruning::last_splits, "last-splits"}, {Pruning::weakest_link, "weakest-link"}}};
+constexpr std::array<Choice<FoldKind>, 2> fold_kinds = {
+    {{FoldKind::random, "random"}, {FoldKind::contiguous, "contiguous"}}};
+constexpr std::array<Choice<Trend>, 5> trend_choices = {{{Trend::any, "any"},
+                                                         {Trend::rising_slopes, "rising-slopes"},
+                                                         {Trend::falling_slopes, "falling-slopes"},
+                                                         {Trend::rising, "rising"},
+                                                         {Trend::falling, "falling"}}};
 
 }  // namespace
 
@@ -51,6 +60,31 @@ std::span<const Choice<Estimation>> choices() {
 template <>
 std::span<const Choice<Loss>> choices() {
   return losses;
+}
+
+template <>
+std::span<const Choice<Pruning>> choices() {
+  return prunings;
+}
+
+template <>
+std::span<const Choice<FoldKind>> choices() {
+  return fold_kinds;
+}
+
+template <>
+std::span<const Choice<Trend>> choices() {
+  return trend_choices;
+}
+
+const std::vector<OptionField>& option_fields() {
+  static const std::vector<OptionField> fields = [] {
+    std::vector<OptionField> list;
+    const FitOptions options;
+    for_each_field(options, [&](const OptionField& field, const auto&) { list.push_back(field); });
+    return list;
+  }();
+  return fields;
 }
 
 std::string describe(StopReason reason) {

@@ -10,6 +10,7 @@
 #include "base/memory.hpp"
 #include "data/table.hpp"
 #include "fit/plan/memory.hpp"
+#include "llmt/option_fields.hpp"
 #include "stream/state.hpp"
 
 namespace llmt {
@@ -102,6 +103,19 @@ std::unique_ptr<StreamState> make_state(Eigen::Index inputs, Eigen::Index output
 }
 
 }  // namespace
+
+StreamOptions stream_options(const FitOptions& options) {
+  require_taken(options, in_stream);
+  const std::vector<double>& shrinkages = options.expert.shrinkages;
+  if (shrinkages.size() > 1) {
+    throw std::invalid_argument(
+        fmt::format("llmt::stream_options: expert.shrinkages has {} numbers, a stream takes one", shrinkages.size()));
+  }
+  StreamOptions result{.min_leaf_samples = options.min_leaf_samples, .max_leaves = options.max_leaves};
+  if (options.significance >= 0.0) result.significance = options.significance;
+  if (!shrinkages.empty()) result.shrinkage = shrinkages.front();
+  return result;
+}
 
 Stream::Stream(Eigen::Index num_inputs, Eigen::Index num_outputs, const StreamOptions& options)
     : state_(make_state(num_inputs, num_outputs, options)) {}

@@ -89,13 +89,13 @@ bool is_row(const std::vector<double>& row, Eigen::Index inputs) {
 struct StreamJson {
   template <class Archive>
   static void fields(Archive& archive, InArchive<Archive, StreamOptions>& options) {
-    archive.number("significance", options.significance);
-    archive.number("min_variance_gain", options.min_variance_gain);
-    archive.count("min_leaf_samples", options.min_leaf_samples, 1);
-    archive.count("max_leaves", options.max_leaves, 1);
-    archive.count("bins", options.bins, 4, 256);
-    archive.number("shrinkage", options.shrinkage);
-    archive.count("reservoir_rows", options.reservoir_rows, 0);
+    for_each_field(options, [&](const char* name, auto& value) {
+      if constexpr (std::is_floating_point_v<std::remove_cvref_t<decltype(value)>>) {
+        archive.number(name, value);
+      } else {  // the defaults are filled in; Stream() checks the bounds
+        archive.count(name, value, std::string_view(name) == "reservoir_rows" ? 0 : 1);
+      }
+    });
   }
 
   template <class Archive>

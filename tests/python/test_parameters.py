@@ -1,0 +1,109 @@
+"""Every parameter of an estimator does something, or is refused by its name, wherever estimators are taken."""
+
+import numpy as np
+import pytest
+
+from llmt import BoostedLocalLinearTreeRegressor, LocalLinearTreeRegressor, distributed
+
+# A value other than the default for each parameter.
+TREE = {
+    "max_leaves": 3,
+    "min_samples_leaf": 30,
+    "rule": "ra",
+    "validity": "crisp",
+    "local_models": "quadratic",
+    "sparse": "always",
+    "loss": "tukey",
+    "cv": 3,
+    "contiguous": True,
+    "select_features": False,
+    "integer_codes": False,
+    "categorical_features": ["d"],
+    "monotonic_cst": {"b": 1},
+    "shared_tree": True,
+    "readable": True,
+    "teach": True,
+    "random_state": 7,
+    "n_jobs": 2,
+}
+SUM = {"learning_rate": 0.3, "max_iter": 4, "categorical_features": ["d"], "random_state": 7, "n_jobs": 2}
+WITHOUT_EFFECT = {"n_jobs"}  # the result does not depend on the number of threads
+
+
+def table(targets=1):
+    pandas = pytest.importorskip("pandas")
+    rng = np.random.default_rng(2)
+    X = rng.uniform(-1, 1, (240, 6))
+    X[:, 3] = rng.integers(0, 5, len(X))  # codes, without order
+    y = np.where(X[:, 0] > 0, 2 * X[:, 1], np.abs(X[:, 2])) + np.array([0, 2, -1, 1, -2])[X[:, 3].astype(int)]
+    y += 0.1 * rng.normal(size=len(X))
+    y[::60] += 8
+    Y = np.column_stack([y, X[:, 2] * y])
+    frame = pandas.DataFrame(X, columns=list("abcdef"))
+    return frame, pandas.Series(y, name="y") if targets == 1 else pandas.DataFrame(Y, columns=["y", "z"])
+
+
+def test_the_values_are_those_of_all_parameters():
+    for values, estimator in ((TREE, LocalLinearTreeRegressor), (SUM, BoostedLocalLinearTreeRegressor)):
+        defaults = estimator().get_params()
+        assert set(values) == set(defaults)
+        assert all(values[name] != defaults[name] for name in values)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", TREE)
+def test_a_parameter_of_a_tree_changes_the_fit(name):
+    X, y = table(2 if name == "shared_tree" else 1)
+    by_default = LocalLinearTreeRegressor().fit(X, y)
+    changed = LocalLinearTreeRegressor(**{name: TREE[name]}).fit(X, y)
+    if name == "teach":  # the taught tree is taken where it is better
+        assert "teaching" in changed.summary_ and "teaching" not in by_default.summary_
+    else:
+        assert (changed.to_json() == by_default.to_json()) == (name in WITHOUT_EFFECT)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", SUM)
+def test_a_parameter_of_a_sum_changes_the_fit(name):
+    X, y = table()
+    by_default = BoostedLocalLinearTreeRegressor().fit(X, y).to_json()
+    changed = BoostedLocalLinearTreeRegressor(**{name: SUM[name]}).fit(X, y).to_json()
+    assert (changed == by_default) == (name in WITHOUT_EFFECT)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", TREE)
+def test_beyond_one_memory_a_parameter_means_what_it_means_in_fit(name):
+    X, y = table()
+    estimator = LocalLinearTreeRegressor(**{name: TREE[name]})
+    try:
+        state = distributed.start(list(X.columns), "y", block_rows=120, estimator=estimator)
+    except ValueError as refused:
+        assert name in str(refused) and "beyond one memory" in str(refused)
+        assert name in {"rule", "local_models", "loss", "categorical_features", "monotonic_cst", "readable", "teach"}
+        return
+    while distributed.status(state)["step"] != "finished":
+        state = distributed.advance(state, distributed.sums(state, X, y))
+    assert distributed.estimator(state).to_json() == estimator.fit(X, y).to_json()
+
+
+@pytest.mark.parametrize("name", TREE)
+def test_a_stream_takes_or_refuses_a_parameter(name):
+    X, y = table()
+    rows, targets = np.tile(X.to_numpy(), (8, 1)), np.tile(y.to_numpy(), 8)
+    stream = LocalLinearTreeRegressor(**{name: TREE[name]})
+    if name in {"max_leaves", "min_samples_leaf", "validity"}:
+        by_default = LocalLinearTreeRegressor().partial_fit(rows, targets).to_json()
+        assert stream.partial_fit(rows, targets).to_json() != by_default
+    elif name in {"select_features", "integer_codes", "random_state", "n_jobs"}:  # streams have nothing of the kind
+        stream.partial_fit(rows, targets)
+    else:
+        with pytest.raises(ValueError, match=f"{name}.* is not for streams"):
+            stream.partial_fit(rows, targets)
+
+
+def test_folds_that_are_dealt_are_not_contiguous_too():
+    X, y = table()
+    halves = [(np.arange(120, 240), np.arange(120)), (np.arange(120), np.arange(120, 240))]
+    with pytest.raises(ValueError, match="contiguous"):
+        LocalLinearTreeRegressor(cv=halves, contiguous=True).fit(X, y)
