@@ -270,39 +270,9 @@ BlockSum sum_block(const StateData& data, const Block& block) {
 
 }  // namespace
 
-Sample& Sample::operator+=(const Sample& other) {
-  if (other.hashes.empty()) return *this;
-  if (hashes.empty()) return *this = other;
-  const std::size_t columns = values.size() / hashes.size();
-  Sample both;
-  both.most = most;
-  std::size_t a = 0;
-  std::size_t b = 0;
-  while (std::ssize(both.hashes) < most && (a < hashes.size() || b < other.hashes.size())) {
-    const bool own = b == other.hashes.size() || (a < hashes.size() && hashes[a] <= other.hashes[b]);
-    const Sample& from = own ? *this : other;
-    std::size_t& at = own ? a : b;
-    both.hashes.push_back(from.hashes[at]);
-    const auto row = from.values.begin() + static_cast<std::ptrdiff_t>(at * columns);
-    both.values.insert(both.values.end(), row, row + static_cast<std::ptrdiff_t>(columns));
-    ++at;
-  }
-  return *this = std::move(both);
-}
-
 BranchRows& BranchRows::operator+=(BranchRows&& next) {
   std::ranges::move(next.pieces, std::back_inserter(pieces));
   return *this;
-}
-
-std::vector<Eigen::Index> first_bins(const StateData& data) {
-  std::vector<Eigen::Index> first = {0};
-  for (Eigen::Index j = 0; j < data.inputs(); ++j) first.push_back(first.back() + bins_of(data, j));
-  return first;
-}
-
-Eigen::VectorXd model_of(const StateData& data, const TopNode& node, int& rank) {
-  return node.base + solve(data.shape(), node.gram.data(), 0.0, rank);
 }
 
 Sums sums(const Rows& rows, const State& state, int max_threads) {

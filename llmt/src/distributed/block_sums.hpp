@@ -10,35 +10,12 @@
 #include <vector>
 
 #include "base/sum_over.hpp"
+#include "distributed/block.hpp"
 #include "distributed/sample_tree.hpp"
 #include "distributed/state.hpp"
 #include "llmt/distributed.hpp"
 
 namespace llmt::distributed {
-
-/// The rows of one block.
-struct Block {
-  const Rows& rows;
-  RowSpan span;
-  Eigen::Index number;  // of the block in the table
-
-  double at(Eigen::Index row, Eigen::Index column) const {
-    if (column < rows.inputs.cols()) return rows.inputs(row, column);
-    return column == rows.inputs.cols() ? rows.output(row) : rows.weights(row);
-  }
-
-  double weight(Eigen::Index row) const { return rows.weights.size() == 0 ? 1.0 : rows.weights(row); }
-};
-
-/// The rows with the smallest hashes of their block and place in it: a sample that is the same however sums are merged.
-struct Sample {
-  Eigen::Index most = 0;              ///< rows that are kept: Options::sample_rows
-  std::vector<std::uint64_t> hashes;  ///< ascending
-  std::vector<double> values;         ///< one row after the other: inputs, output, weight if there is one
-
-  Sample& operator+=(const Sample& other);
-  static auto fields(auto& self) { return std::tie(self.most, self.hashes, self.values); }
-};
 
 /// What describes the columns, over the rows whose weight is not 0.
 struct Description {
@@ -116,18 +93,7 @@ struct SumsData {
 /// Throws std::runtime_error if sizes or numbers of blocks do not go together.
 void check_sums(const SumsData& data);
 
-/// Bins of an input: one more than edges, or the levels of a category.
-inline Eigen::Index bins_of(const StateData& data, Eigen::Index input) {
-  return data.is_category(input) ? std::ssize(data.levels[input]) : std::ssize(data.edges[input]) + 1;
-}
-
-/// Where an input's bins begin among those of a node; of the number of inputs: the number of bins.
-std::vector<Eigen::Index> first_bins(const StateData& data);
-
 /// Whether the rows of a block are held out: every eighth block.
 inline bool is_held_out(Eigen::Index block) { return block % 8 == 7; }
-
-/// Constant and slopes of a node's local model, in scaled columns. `rank`: of [1, z] over its rows.
-Eigen::VectorXd model_of(const StateData& data, const TopNode& node, int& rank);
 
 }  // namespace llmt::distributed

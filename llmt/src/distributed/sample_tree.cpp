@@ -11,7 +11,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "distributed/block_sums.hpp"
 #include "distributed/top_model.hpp"
 #include "llmt/fit.hpp"
 #include "partition/leaf_validities.hpp"
@@ -171,10 +170,6 @@ void take_root(StateData& data, JointSums& sums) {
 }
 
 }  // namespace
-
-Eigen::Index unknowns_of(const StateData& data) {
-  return data.sample ? tree_of(data).num_leaves() * (1 + std::ssize(data.sample->regressors())) : 0;
-}
 
 void take_sample(StateData& data, const Sample& sample, const Progress& progress, int max_threads) {
   const Eigen::Index rows = std::ssize(sample.hashes);

@@ -8,13 +8,11 @@
 #include <vector>
 
 #include "base/sums.hpp"
+#include "distributed/block.hpp"
 #include "distributed/state.hpp"
 #include "llmt/progress.hpp"
 
 namespace llmt::distributed {
-
-struct Block;
-struct Sample;
 
 /// Sums over rows for the local models of the sample's tree. Unknowns: of each leaf a constant and a slope for every
 /// regressor, leaf after leaf; the last row and column of a matrix are those of the residual of the sample's model.
@@ -29,9 +27,6 @@ struct JointSums {
     return std::tie(self.gram, self.leaf_rows, self.leaf_squares, self.tree_squares, self.root_residual);
   }
 };
-
-/// Unknowns of the joint equations of a tree; 0: there is none.
-Eigen::Index unknowns_of(const StateData& data);
 
 /// Fits the sample's tree, unless it has too many leaves for its equations to be summed.
 void take_sample(StateData& data, const Sample& sample, const Progress& progress, int max_threads);

@@ -8,8 +8,8 @@
 #include <set>
 #include <stdexcept>
 
-#include "distributed/sample_tree.hpp"
 #include "llmt/intervals.hpp"
+#include "stream/sums.hpp"
 
 namespace llmt::distributed {
 namespace {
@@ -144,6 +144,20 @@ std::vector<Eigen::Index> StateData::numbers() const {
     if (levels[j].empty()) numbers.push_back(j);
   }
   return numbers;
+}
+
+std::vector<Eigen::Index> first_bins(const StateData& data) {
+  std::vector<Eigen::Index> first = {0};
+  for (Eigen::Index j = 0; j < data.inputs(); ++j) first.push_back(first.back() + bins_of(data, j));
+  return first;
+}
+
+Eigen::VectorXd model_of(const StateData& data, const TopNode& node, int& rank) {
+  return node.base + solve(data.shape(), node.gram.data(), 0.0, rank);
+}
+
+Eigen::Index unknowns_of(const StateData& data) {
+  return data.sample ? data.sample->partitions().front().num_leaves() * (1 + std::ssize(data.sample->regressors())) : 0;
 }
 
 std::string sealed(char kind, const std::string& content) {

@@ -128,6 +128,20 @@ struct StateData {
   }
 };
 
+/// Bins of an input: one more than edges, or the levels of a category.
+inline Eigen::Index bins_of(const StateData& data, Eigen::Index input) {
+  return data.is_category(input) ? std::ssize(data.levels[input]) : std::ssize(data.edges[input]) + 1;
+}
+
+/// Where an input's bins begin among those of a node; of the number of inputs: the number of bins.
+std::vector<Eigen::Index> first_bins(const StateData& data);
+
+/// Constant and slopes of a node's local model, in scaled columns. `rank`: of [1, z] over its rows.
+Eigen::VectorXd model_of(const StateData& data, const TopNode& node, int& rank);
+
+/// Unknowns of the joint equations of a tree; 0: there is none.
+Eigen::Index unknowns_of(const StateData& data);
+
 /// Makes a state of what is known: its mark, and its model.
 State finish_state(StateData data);
 

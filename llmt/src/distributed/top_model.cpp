@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "distributed/block_sums.hpp"
 #include "estimation/estimate.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "llmt/model.hpp"
