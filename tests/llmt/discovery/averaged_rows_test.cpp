@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 
 namespace averaged_rows_test {

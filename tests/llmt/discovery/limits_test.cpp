@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "llmt/discovery/simulation.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "noise.hpp"
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "discovery/terms/row_split.hpp"
+#include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -66,7 +67,7 @@ Missing of_all_rows(Missing missing, const AveragedRows& few, const Simulation& 
   for (std::size_t k = 0; k < simulation.parameters.size(); ++k) nominal(k) = simulation.parameters[k].value;
   const Eigen::MatrixXd simulated = simulation.predict(inputs.values, nominal);
   missing.before = simulated + spread_out(missing.before - means(simulated, blocks), blocks, n);
-  missing.corrected = corrected(simulation, missing, terms, inputs);
+  missing.corrected = with_found_terms(simulation, missing, terms, inputs);
   if (missing.change_by_smoothing.size() > 0) {
     missing.change_by_smoothing = spread_out(missing.change_by_smoothing, blocks, n);
   }

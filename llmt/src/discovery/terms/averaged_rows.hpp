@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "discovery/terms/samples.hpp"
-#include "llmt/discovery/simulation.hpp"
+#include "llmt/discovery/missing.hpp"
+#include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
 

@@ -10,7 +10,6 @@
 #include <set>
 
 #include "discovery/terms/refuse.hpp"
-#include "llmt/discovery/simulation.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -137,48 +136,6 @@ void describe_parameters(const ParameterFits& fits, const DistinctParameters& di
   if (missing.answer == Answer::nothing_missing && missing.parameter_gain > 0.0 && chance < false_alarm_rate) {
     missing.answer = Answer::parameters_only;
   }
-}
-
-Simulation linearised(Simulation simulation, const Eigen::MatrixXd& simulated, std::vector<Parameter> parameters,
-                      std::vector<Eigen::MatrixXd> derivatives) {
-  if (parameters.size() != derivatives.size()) {
-    refuse("linearised", fmt::format("{} parameters, {} derivatives", parameters.size(), derivatives.size()));
-  }
-  std::set<std::string> names;
-  for (const Parameter& own : simulation.parameters) names.insert(own.name);
-  Eigen::VectorXd nominal(std::ssize(parameters));
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    Parameter& parameter = parameters[k];
-    if (parameter.name.empty()) refuse("linearised", "a parameter has no name");
-    if (!names.insert(parameter.name).second) {
-      refuse("linearised", fmt::format("the parameter \"{}\" is there twice", parameter.name));
-    }
-    const Eigen::MatrixXd& by = derivatives[k];
-    if (by.rows() != simulated.rows() || by.cols() != simulated.cols()) {
-      refuse("linearised", fmt::format("the derivatives by {} are {} x {}, must be {} x {}", parameter.name, by.rows(),
-                                       by.cols(), simulated.rows(), simulated.cols()));
-    }
-    if (!by.allFinite()) refuse("linearised", fmt::format("a derivative by {} is not finite", parameter.name));
-    nominal(k) = parameter.value;
-    double largest = 0.0;
-    for (Eigen::Index o = 0; o < by.cols(); ++o) {
-      const auto output = simulated.col(o);
-      const double spread = output.size() > 0 ? output.maxCoeff() - output.minCoeff() : 0.0;
-      const double rms = by.col(o).norm() / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, by.rows())));
-      largest = std::max(largest, rms / (spread > 0.0 ? spread : 1.0));
-    }
-    constexpr double share_of_spread = 0.01;
-    parameter.scale = largest > 0.0 ? share_of_spread / largest : 1.0;
-  }
-  const Eigen::Index own = std::ssize(simulation.parameters);
-  simulation.parameters.insert(simulation.parameters.end(), parameters.begin(), parameters.end());
-  simulation.predict = [base = std::move(simulation.predict), nominal, by = std::move(derivatives), own](
-                           const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values) {
-    Eigen::MatrixXd predicted = base(inputs, values.head(own));
-    for (Eigen::Index k = 0; k < nominal.size(); ++k) predicted += (values(own + k) - nominal(k)) * by[k];
-    return predicted;
-  };
-  return simulation;
 }
 
 }  // namespace llmt::discovery

@@ -7,7 +7,6 @@
 
 #include "discovery/terms/derivatives.hpp"
 #include "llmt/discovery/model_term.hpp"
-#include "llmt/discovery/simulation.hpp"
 
 namespace llmt::discovery {
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "discovery/terms/motion.hpp"
+#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 namespace {

@@ -4,7 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "llmt/discovery/simulation.hpp"
+#include "llmt/discovery/missing.hpp"
+#include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
 

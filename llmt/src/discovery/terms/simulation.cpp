@@ -12,6 +12,7 @@
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/determined.hpp"
 #include "discovery/terms/limits.hpp"
+#include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/motion.hpp"
 #include "discovery/terms/one_search.hpp"
 #include "discovery/terms/progress_of_searches.hpp"
@@ -320,19 +321,8 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
 }
 
 Eigen::MatrixXd corrected(const Simulation& simulation, const Missing& missing, const std::vector<ModelTerm>& terms,
-                          const Inputs& elsewhere) {
-  Inputs inputs = elsewhere;
-  if (inputs.zero_bands.size() == 0) inputs.zero_bands = missing.zero_bands;
-  std::vector<std::string> outputs;
-  for (const Gap& gap : missing.gaps) outputs.push_back(gap.output);
-  const TermModel model(simulation, inputs, outputs, terms);
-  Eigen::VectorXd values(std::ssize(missing.parameters));
-  for (std::size_t k = 0; k < missing.parameters.size(); ++k) values(k) = missing.parameters[k].value;
-  std::vector<PlacedTerm> placed;
-  for (const FoundTerm& found : missing.found) {
-    placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
-  }
-  return model.predict(values, placed);
+                          const Inputs& inputs) {
+  return with_found_terms(simulation, missing, terms, inputs);
 }
 
 }  // namespace llmt::discovery

@@ -264,4 +264,20 @@ TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::Vec
   return {};
 }
 
+Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& missing,
+                                 const std::vector<ModelTerm>& terms, const Inputs& elsewhere) {
+  Inputs inputs = elsewhere;
+  if (inputs.zero_bands.size() == 0) inputs.zero_bands = missing.zero_bands;
+  std::vector<std::string> outputs;
+  for (const Gap& gap : missing.gaps) outputs.push_back(gap.output);
+  const TermModel model(simulation, inputs, outputs, terms);
+  Eigen::VectorXd values(std::ssize(missing.parameters));
+  for (std::size_t k = 0; k < missing.parameters.size(); ++k) values(k) = missing.parameters[k].value;
+  std::vector<PlacedTerm> placed;
+  for (const FoundTerm& found : missing.found) {
+    placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
+  }
+  return model.predict(values, placed);
+}
+
 }  // namespace llmt::discovery

@@ -76,6 +76,10 @@ struct TermFit {
 TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
                   const std::vector<PlacedTerm>& placed);
 
+/// What corrected() of llmt/discovery/simulation.hpp returns.
+Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& missing,
+                                 const std::vector<ModelTerm>& terms, const Inputs& inputs);
+
 /// Autocorrelation of stacked residuals of samples in time, for each output, see autocorrelation(); d empty lists for
 /// samples that are not in time.
 std::vector<std::vector<double>> correlations_of(const TermData& data, const Eigen::VectorXd& residuals);
