@@ -3,7 +3,8 @@
 
 #include <vector>
 
-#include "llmt/robotics/calibration.hpp"
+#include "llmt/robotics/calibration_options.hpp"
+#include "llmt/robotics/robot_types.hpp"
 
 namespace llmt::robotics {
 

@@ -5,26 +5,11 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "discovery/search/replacements.hpp"
 
 namespace llmt::discovery {
-
-std::set<std::string> families_of(const Scoring& scoring, const Set& set) {
-  std::set<std::string> families;
-  for (const std::size_t a : set) families.insert(scoring.candidates()[a].family);
-  return families;
-}
-
-Set without_family(const Scoring& scoring, const Set& set, const std::string& family) {
-  return filtered(set, [&](std::size_t a) { return scoring.candidates()[a].family != family; });
-}
-
-double share_of(const Scoring& scoring, const Set& set, const Set& rest) {
-  const double total = scoring.workspace().sum_of_squares();
-  const double left = scoring.fit(set).left;
-  return total > left ? (scoring.fit(rest).left - left) / (total - left) : 0.0;
-}
 
 Finding finding_of(const Scoring& scoring, const Set& set, const Set& whole, const std::string& family,
                    const SearchOptions& options) {

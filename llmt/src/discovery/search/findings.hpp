@@ -1,20 +1,12 @@
 // Properties of every family and every candidate under the best explanation: steps 7 and 8 of search().
 #pragma once
 
-#include <set>
 #include <string>
 #include <vector>
 
 #include "discovery/search/scoring.hpp"
 
 namespace llmt::discovery {
-
-std::set<std::string> families_of(const Scoring& scoring, const Set& set);
-
-Set without_family(const Scoring& scoring, const Set& set, const std::string& family);
-
-/// Share of the sum of squares explained by `set` that is lost where only `rest`, a subset of it, explains.
-double share_of(const Scoring& scoring, const Set& set, const Set& rest);
 
 /// The finding of one family of `set`. `whole` is the best explanation before immaterial families are dropped; rivals
 /// are compared within it.

@@ -5,7 +5,6 @@
 #include <set>
 
 #include "discovery/search/explore.hpp"
-#include "discovery/search/findings.hpp"
 
 namespace llmt::discovery {
 namespace {

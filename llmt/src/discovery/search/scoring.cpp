@@ -247,4 +247,20 @@ Scoring::Deletion Scoring::deletion(const SetFit& fit) const {
   return deletion;
 }
 
+std::set<std::string> families_of(const Scoring& scoring, const Set& set) {
+  std::set<std::string> families;
+  for (const std::size_t a : set) families.insert(scoring.candidates()[a].family);
+  return families;
+}
+
+Set without_family(const Scoring& scoring, const Set& set, const std::string& family) {
+  return filtered(set, [&](std::size_t a) { return scoring.candidates()[a].family != family; });
+}
+
+double share_of(const Scoring& scoring, const Set& set, const Set& rest) {
+  const double total = scoring.workspace().sum_of_squares();
+  const double left = scoring.fit(set).left;
+  return total > left ? (scoring.fit(rest).left - left) / (total - left) : 0.0;
+}
+
 }  // namespace llmt::discovery

@@ -3,6 +3,8 @@
 
 #include <functional>
 #include <limits>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "discovery/search/workspace.hpp"
@@ -87,5 +89,12 @@ bool contains(const Set& set, std::size_t candidate);
 Set with(Set set, std::size_t candidate);
 Set without(Set set, std::size_t candidate);
 Set filtered(const Set& set, const std::function<bool(std::size_t)>& keep);
+
+std::set<std::string> families_of(const Scoring& scoring, const Set& set);
+
+Set without_family(const Scoring& scoring, const Set& set, const std::string& family);
+
+/// Share of the sum of squares explained by `set` that is lost where only `rest`, a subset of it, explains.
+double share_of(const Scoring& scoring, const Set& set, const Set& rest);
 
 }  // namespace llmt::discovery
