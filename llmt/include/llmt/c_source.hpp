@@ -3,19 +3,13 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 #include "llmt/abi.hpp"
 #include "llmt/boosted_model.hpp"
+#include "llmt/c_code.hpp"
 #include "llmt/model.hpp"
 
 namespace llmt {
-
-/// A source and its header.
-struct CSource {
-  std::string source;
-  std::string header;
-};
 
 /// Model::predict() as C99 without dependencies but <math.h>, of which only Gaussian validities call a function, exp():
 /// tables and a function
@@ -37,8 +31,5 @@ CSource to_c(const Model& model, const std::string& name, const std::string& hea
 /// trees has tables of megabytes: about 100 bytes of text, and 60 of constants in the program, for a leaf and its
 /// split.
 CSource to_c(const BoostedModel& model, const std::string& name, const std::string& header_name);
-
-/// Whether a text is an identifier of C of at most 31 characters, and no keyword.
-bool is_c_identifier(std::string_view text);
 
 }  // namespace llmt

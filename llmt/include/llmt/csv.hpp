@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/decimal_mark.hpp"
 
 namespace llmt {
 
@@ -42,9 +43,6 @@ struct CsvNumbers {
   Eigen::MatrixXd values;          ///< rows x columns; NaN where the cell is not a number
   std::vector<ColumnCells> cells;  ///< per column
 };
-
-/// What stands between the whole and the fraction of a number.
-enum class DecimalMark : char { point = '.', comma = ',' };
 
 /// A cell is no number only because it has the other decimal mark.
 class DecimalMarkError : public std::runtime_error {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "llmt/c_source.hpp"
+#include "llmt/c_code.hpp"
 #include "llmt/partition.hpp"
 
 namespace llmt {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "llmt/csv.hpp"
+#include "llmt/decimal_mark.hpp"
 
 namespace llmt::csv {
 

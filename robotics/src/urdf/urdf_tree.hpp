@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "llmt/robotics/urdf.hpp"
+#include "llmt/robotics/chain.hpp"
+#include "llmt/robotics/urdf_links.hpp"
 
 namespace llmt::robotics {
 

@@ -7,21 +7,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/discovery/log.hpp"
 
 namespace llmt::discovery {
-
-/// Signals as they were recorded, n rows in the order of time.
-struct Log {
-  Eigen::VectorXd time;             ///< n, in s
-  Eigen::MatrixXd positions;        ///< n x p
-  Eigen::MatrixXd torques;          ///< n x k: what is filtered and not differentiated; k may be 0
-  std::vector<std::string> runs{};  ///< n names of the run of each row, the rows of a run together; empty: one run
-};
 
 struct SignalsOptions {
   double cutoff = 0.0;  ///< in Hz: the gain is 1/sqrt(2) there
@@ -68,17 +60,6 @@ struct Signals {
   bool resampled = false;          ///< samples were not equally spaced, and were interpolated
   std::vector<ColumnNoise> position_noise;  ///< p
   std::vector<ColumnNoise> torque_noise;    ///< k; derivatives are 0
-};
-
-/// A log that cannot be used.
-class LogError : public std::invalid_argument {
- public:
-  LogError(const std::string& message, Eigen::Index row) : std::invalid_argument(message), row_(row) {}
-
-  Eigen::Index row() const { return row_; }  ///< of the log; -1: no row in particular
-
- private:
-  Eigen::Index row_;
 };
 
 /// Filters and differentiates. With x = (2 pi f s)^2 / 2 the filter has the gain

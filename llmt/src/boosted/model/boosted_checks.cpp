@@ -23,19 +23,20 @@ void check_names_of(const char* list, const std::vector<Column>& columns) {
   }
 }
 
-void check_inputs(const BoostedModel& model) {
-  if (model.inputs().empty()) fail("/inputs", "there is none");
-  if (model.outputs().empty()) fail("/outputs", "there is none");
-  check_names_of("inputs", model.inputs());
-  check_names_of("outputs", model.outputs());
-  if (model.deviations().size() != model.inputs().size()) fail("", "not one deviation an input");
-  for (std::size_t j = 0; j < model.inputs().size(); ++j) {
+void check_columns(const std::vector<InputColumn>& inputs, const std::vector<OutputColumn>& outputs,
+                   const std::vector<double>& deviations) {
+  if (inputs.empty()) fail("/inputs", "there is none");
+  if (outputs.empty()) fail("/outputs", "there is none");
+  check_names_of("inputs", inputs);
+  check_names_of("outputs", outputs);
+  if (deviations.size() != inputs.size()) fail("", "not one deviation an input");
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
     const std::string pointer = fmt::format("/inputs/{}", j);
-    if (!std::isfinite(model.inputs()[j].centre)) fail(pointer, "centre is not finite");
-    const double deviation = model.deviations()[j];
+    if (!std::isfinite(inputs[j].centre)) fail(pointer, "centre is not finite");
+    const double deviation = deviations[j];
     if (!std::isfinite(deviation) || deviation <= 0.0) fail(pointer, "deviation is not a positive number");
-    if (!model.inputs()[j].codes.empty()) fail(pointer, "a boosted model has no codes");
-    const std::vector<std::string>& levels = model.inputs()[j].levels;
+    if (!inputs[j].codes.empty()) fail(pointer, "a boosted model has no codes");
+    const std::vector<std::string>& levels = inputs[j].levels;
     if (std::set<std::string>(levels.begin(), levels.end()).size() != levels.size()) {
       fail(pointer, "two levels have one name");
     }
@@ -119,17 +120,18 @@ void check_residuals(const std::vector<double>& residuals, const std::string& po
 
 }  // namespace
 
-void check_boosted(const BoostedModel& model) {
-  check_inputs(model);
-  if (model.sums().size() != model.outputs().size()) fail("/sums", "not one sum an output");
-  for (std::size_t o = 0; o < model.sums().size(); ++o) {
-    const BoostedSum& sum = model.sums()[o];
+void check_boosted(const std::vector<InputColumn>& inputs, const std::vector<OutputColumn>& outputs,
+                   const std::vector<double>& deviations, const std::vector<BoostedSum>& sums) {
+  check_columns(inputs, outputs, deviations);
+  if (sums.size() != outputs.size()) fail("/sums", "not one sum an output");
+  for (std::size_t o = 0; o < sums.size(); ++o) {
+    const BoostedSum& sum = sums[o];
     const std::string pointer = fmt::format("/sums/{}", o);
     if (!std::isfinite(sum.base)) fail(pointer, "base is not finite");
     if (!std::isfinite(sum.rate) || sum.rate <= 0.0 || sum.rate > 1.0) fail(pointer, "rate is not in (0, 1]");
     check_residuals(sum.residuals, pointer);
     for (std::size_t k = 0; k < sum.features.size(); ++k) {
-      check_feature(sum.features[k], model.inputs(), fmt::format("{}/features/{}", pointer, k));
+      check_feature(sum.features[k], inputs, fmt::format("{}/features/{}", pointer, k));
     }
     for (std::size_t k = 0; k < sum.trees.size(); ++k) {
       check_tree(sum.trees[k], sum.features.size(), fmt::format("{}/trees/{}", pointer, k));

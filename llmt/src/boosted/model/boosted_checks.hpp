@@ -1,12 +1,14 @@
 /// \file
-/// Checks of a boosted model, and its arithmetic for one row.
+/// Checks of the parts of a boosted model, and its arithmetic for one row.
 #pragma once
 
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
-#include "llmt/boosted_model.hpp"
+#include "llmt/boosted_sum.hpp"
+#include "llmt/partition.hpp"
 
 namespace llmt {
 
@@ -27,7 +29,8 @@ class BoostedFault : public std::invalid_argument {
 };
 
 /// Throws BoostedFault for the first part that does not fit: see BoostedModel::BoostedModel().
-void check_boosted(const BoostedModel& model);
+void check_boosted(const std::vector<InputColumn>& inputs, const std::vector<OutputColumn>& outputs,
+                   const std::vector<double>& deviations, const std::vector<BoostedSum>& sums);
 
 /// The value of a feature at the row `x`; NaN: missing, which a level that is not known is too.
 double feature_at(const BoostedFeature& feature, std::span<const InputColumn> inputs,

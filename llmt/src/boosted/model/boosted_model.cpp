@@ -125,7 +125,7 @@ BoostedModel::BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputCo
       outputs_(std::move(outputs)),
       deviations_(std::move(deviations)),
       sums_(std::move(sums)) {
-  check_boosted(*this);
+  check_boosted(inputs_, outputs_, deviations_, sums_);
 }
 
 BoostedSize size_of(const BoostedModel& model) {

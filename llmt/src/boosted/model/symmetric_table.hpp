@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "llmt/boosted_model.hpp"
+#include "llmt/boosted_sum.hpp"
 
 namespace llmt {
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "llmt/boosted_model.hpp"
+#include "llmt/boosted_sum.hpp"
 
 namespace llmt {
 

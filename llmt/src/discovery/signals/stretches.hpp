@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "llmt/discovery/signals.hpp"
+#include "llmt/discovery/log.hpp"
 
 namespace llmt::discovery {
 

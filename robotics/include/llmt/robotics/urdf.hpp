@@ -6,14 +6,9 @@
 
 #include "llmt/abi.hpp"
 #include "llmt/robotics/chain.hpp"
+#include "llmt/robotics/urdf_links.hpp"
 
 namespace llmt::robotics {
-
-/// Which links of a URDF are base and tip of the arm.
-struct UrdfLinks {
-  std::string base;  ///< empty: the root
-  std::string tip;   ///< empty: the only end of a chain with joints that move
-};
 
 /// Whether the name of a file ends in ".urdf".
 bool is_urdf(const std::string& path);

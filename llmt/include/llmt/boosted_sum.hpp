@@ -1,0 +1,64 @@
+/// \file
+/// The parts of a boosted model as plain data: features, trees, and their sum.
+#pragma once
+
+#include <vector>
+
+namespace llmt {
+
+/// A number of a row that trees split on and that leaves take as a regressor: a standardised input
+/// z = (x - centre) / deviation, the sum or difference of two, or the indicator (0 or 1) of a level of a categorical
+/// input.
+struct BoostedFeature {
+  int first = 0;
+  int second = -1;    ///< -1: the input alone
+  double sign = 1.0;  ///< of the second input
+  int level = -1;     ///< -1: a number
+
+  bool operator==(const BoostedFeature&) const = default;
+};
+
+/// The largest number of slopes in a leaf of a tree that boosting grew.
+inline constexpr int most_boosted_slopes = 8;
+/// The largest number of slopes in a leaf of any tree. The time of contributions of inputs may double with each.
+inline constexpr int most_leaf_slopes = 12;
+
+/// f = constant + sum of slopes . features, held to [low, high].
+struct BoostedLeaf {
+  double constant = 0.0;
+  double low = 0.0;
+  double high = 0.0;
+  std::vector<int> features = {};  ///< indices into BoostedSum::features
+  std::vector<double> slopes = {};
+};
+
+/// z <= threshold of a feature goes to the left. With a half width h > 0 the rows with |z - threshold| < h go to both
+/// sides, to the right with the weight 1/2 + u (3 - u^2) / 4, u = (z - threshold) / h, unless one side would get less
+/// of the row than BoostedTree::smallest_share: then the side on which it lies takes all.
+struct BoostedSplit {
+  int feature = 0;
+  double threshold = 0.0;
+  double half_width = 0.0;
+  bool missing_left = false;
+  int left = 0;  ///< a split below this one; or -1 - k: leaf k
+  int right = 0;
+};
+
+/// One tree; the first split is the root. Without splits there is one leaf.
+struct BoostedTree {
+  std::vector<BoostedSplit> splits;
+  std::vector<BoostedLeaf> leaves;
+  double smallest_share = 0.08;  ///< from 0 to 0.5, see BoostedSplit
+};
+
+/// The trees of one output: y = base + rate . sum of trees.
+struct BoostedSum {
+  double base = 0.0;
+  double rate = 1.0;
+  std::vector<BoostedFeature> features;
+  std::vector<BoostedTree> trees;
+  /// Absolute residuals of held-out rows under trees that were fitted without them, ascending; empty: there are none.
+  std::vector<double> residuals = {};
+};
+
+}  // namespace llmt

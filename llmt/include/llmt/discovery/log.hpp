@@ -1,0 +1,33 @@
+/// \file
+/// Signals of a machine as they were recorded.
+#pragma once
+
+#include <Eigen/Core>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "llmt/abi.hpp"
+
+namespace llmt::discovery {
+
+/// Signals as they were recorded, n rows in the order of time.
+struct Log {
+  Eigen::VectorXd time;             ///< n, in s
+  Eigen::MatrixXd positions;        ///< n x p
+  Eigen::MatrixXd torques;          ///< n x k: what is filtered and not differentiated; k may be 0
+  std::vector<std::string> runs{};  ///< n names of the run of each row, the rows of a run together; empty: one run
+};
+
+/// A log that cannot be used.
+class LogError : public std::invalid_argument {
+ public:
+  LogError(const std::string& message, Eigen::Index row) : std::invalid_argument(message), row_(row) {}
+
+  Eigen::Index row() const { return row_; }  ///< of the log; -1: no row in particular
+
+ private:
+  Eigen::Index row_;
+};
+
+}  // namespace llmt::discovery
