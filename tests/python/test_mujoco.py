@@ -152,8 +152,6 @@ def test_what_is_found_makes_the_replay_of_another_run_right():
 class Found:
     """A result with given terms, as apply() reads one."""
 
-    _question = {"input_names": ["x", "dx", "ddx"], "output_names": ["u"]}
-
     def __init__(self, *terms, verdict="named", parameters=(), **marks):
         self.terms, self.verdict, self.parameters, self.marks = terms, verdict, parameters, marks
 
@@ -169,7 +167,8 @@ class Found:
             | self.marks
             for name, location, *values in self.terms
         ]
-        return {"verdict": self.verdict, "parameters": self.parameters, "effects": effects}
+        columns = {"inputs": [{"name": name} for name in ("x", "dx", "ddx")], "outputs": [{"name": "u"}]}
+        return {"verdict": self.verdict, "parameters": self.parameters, "effects": effects} | columns
 
 
 def test_terms_of_the_own_motion_become_fields():

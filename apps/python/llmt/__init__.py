@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ._boosted import BoostedLocalLinearTreeRegressor as BoostedLocalLinearTreeRegressor
     from ._discover import Missing as Missing
-    from ._discover import Parameter as Parameter
     from ._discover import discover as discover
     from ._discover import find_missing as find_missing
     from ._found import Found as Found
     from ._found import load_found as load_found
+    from ._given import Parameter as Parameter
     from ._estimator import LocalLinearTreeRegressor as LocalLinearTreeRegressor
     from ._load import load as load
     from ._model import BoostedModel as BoostedModel
@@ -40,7 +40,7 @@ _homes = {
     "LocalLinearTreeRegressor": "_estimator",
     "Missing": "_discover",
     "Model": "_model",
-    "Parameter": "_discover",
+    "Parameter": "_given",
     "Signals": "_signals",
     "__version__": "_core",
     "discover": "_discover",

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from llmt._given import in_order, in_order_of_outputs, in_time, is_table, matrix_of
+
 
 class Found:
     """Terms and changes of parameters that a simulation lacks, as :func:`load_found` reads them."""
@@ -54,17 +56,16 @@ class Found:
         run, another unit), and where a term is not finite at a row.
         """
         from llmt import _core
-        from llmt._discover import _in_order, _in_order_of_outputs, _in_time, _is_table, _matrix
 
-        rows, columns = _matrix(inputs, "inputs", "x")
-        rows = _in_order(rows, columns, self.inputs, _is_table(inputs))
-        values, found = _matrix(simulated, "simulated", "y")
-        if _is_table(simulated):
-            values = _in_order_of_outputs(values, found, self.outputs)
+        rows, columns = matrix_of(inputs, "inputs", "x")
+        rows = in_order(rows, columns, self.inputs, is_table(inputs))
+        values, found = matrix_of(simulated, "simulated", "y")
+        if is_table(simulated):
+            values = in_order_of_outputs(values, found, self.outputs)
         shape = (len(rows), len(self.outputs))
         if values.shape != shape:
             raise ValueError(f"simulated has the shape {values.shape}, must be {shape[0]} x {shape[1]}")
-        given = {} if derivatives is None else {name: _matrix(by, name, "y")[0] for name, by in derivatives.items()}
+        given = {} if derivatives is None else {name: matrix_of(by, name, "y")[0] for name, by in derivatives.items()}
         for name, by in given.items():
             if by.shape != shape:
                 raise ValueError(f"derivatives by {name} have the shape {by.shape}, must be {shape[0]} x {shape[1]}")
@@ -74,7 +75,7 @@ class Found:
                 f"the parameter {missing[0]!r} changes: derivatives by it are needed, or parameters_are_set=True "
                 "where simulated was computed with its new value"
             )
-        instants, runs = _in_time(time, groups, len(rows), False)
+        instants, runs = in_time(time, groups, len(rows), False)
         made = _core.apply_found(
             self._json,
             np.ascontiguousarray(rows),

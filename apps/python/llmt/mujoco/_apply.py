@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from llmt._discover import Missing
+from llmt._results import Findings
 
 from ._models import _BODY_KINDS, _compiled, _places, _positions, _set, _value
 
@@ -74,7 +74,7 @@ def _add(joint: Any, field: str, change: float) -> None:
         setattr(joint, field, value)
 
 
-def apply(found: Missing, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | None]:
+def apply(found: Findings, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | None]:
     """A copy of the specification with what was found by :func:`llmt.discover` with :func:`inverse_dynamics`, and a
     callback for what has no field in it (None: nothing).
 
@@ -87,16 +87,15 @@ def apply(found: Missing, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | 
     rows set aside. Where nothing is missing, or where the answer is an inner state, the specification is copied as it
     is: what stands beside a state was fitted with it.
     """
-    question = found._question
-    positions = _positions(question["input_names"])
-    outputs = list(question["output_names"])
+    answer = found.to_dict()
+    positions = _positions(column["name"] for column in answer["inputs"])
+    outputs = [column["name"] for column in answer["outputs"]]
     nominal = _compiled(spec)
     if len(positions) != nominal.nv or len(outputs) != nominal.nv:
         raise ValueError(
             f"the model has {nominal.nv} joints, the result has {len(positions)} positions, {len(outputs)} outputs"
         )
     fixed = spec.copy()
-    answer = found.to_dict()
     states = [_title(term) for term in answer["effects"] if "inner_state" in term]
     if states:
         warnings.warn(f"nothing is changed: MuJoCo cannot take the inner state {'; '.join(states)}", stacklevel=2)
@@ -106,7 +105,7 @@ def apply(found: Missing, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | 
     spec_joints = [
         joints[nominal.joint(k).name] if nominal.joint(k).name in joints else fixed.joints[k] for k in range(nominal.nv)
     ]
-    _set_spec(fixed, spec_joints, nominal, _fitted(found, nominal))
+    _set_spec(fixed, spec_joints, nominal, _fitted(answer, nominal))
     correction = _Correction()
     left_out = []
     for term in answer["effects"]:
@@ -126,12 +125,11 @@ def _title(term: Mapping[str, Any]) -> str:
     return f"{term['name']} of {term['location'] or 'the output'} ({term['formula']}) on {term['output']}"
 
 
-def _fitted(found: Missing, nominal: Any) -> dict[str, float]:
+def _fitted(answer: Mapping[str, Any], nominal: Any) -> dict[str, float]:
     """Values by parameter. Of parameters that the rows do not tell apart, "a + b", the first one takes the change."""
-    data = found.to_dict()
     values: dict[str, float] = {}
     places = _places(nominal)
-    for parameter in data.get("parameters", data.get("simulation", [])):
+    for parameter in answer["parameters"]:
         name = parameter["name"]
         first = name if name in places else name.split(" + ")[0].split(" - ")[0]
         if first not in places:

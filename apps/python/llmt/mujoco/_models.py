@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from llmt._discover import Parameter
+from llmt._given import Parameter
 from llmt._results import names
 from llmt.tables.named import columns_of
 

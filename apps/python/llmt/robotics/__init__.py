@@ -16,8 +16,8 @@ The functions do what the commands of ``llmt-robot`` do, and their arguments are
 """
 
 from llmt.robotics._results import Calibration, Check, Commands, Discovery, PoseChoice, RobotWarning
-from llmt.robotics._robot import Robot, robot
-from llmt.robotics._tasks import calibrate, check, compensate, discover, export, poses, predict, simulate
+from llmt.robotics._robot import Robot, predict, robot
+from llmt.robotics._tasks import calibrate, check, compensate, discover, export, poses, simulate
 
 __all__ = [
     "Calibration",

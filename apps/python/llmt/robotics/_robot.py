@@ -1,4 +1,4 @@
-"""A robot's description."""
+"""A robot's description, and where it puts its tool."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from llmt._results import html_table
+from llmt.robotics._csv import Source, frame_of, source_of
 
 
 class RobotWarning(UserWarning):
@@ -25,6 +26,22 @@ def _extension() -> Any:
     if not hasattr(_core, "Robot"):
         raise ImportError("llmt.robotics: this package was built without the robot layer")
     return _core
+
+
+def _reading(columns: Any, orientations: bool = False, decimal_comma: bool = False) -> Any:
+    source: Source | None = None
+    if isinstance(columns, Mapping):
+        whole = columns if isinstance(columns.get("columns"), Mapping) else {"columns": dict(columns)}
+        source = ("<columns>", json.dumps(whole))
+    elif columns is not None:
+        source = (os.fspath(columns), None)
+    return _extension().Reading(source, bool(orientations), bool(decimal_comma))
+
+
+def _warned(made: dict[str, Any]) -> dict[str, Any]:
+    for sentence in made["warnings"]:
+        warnings.warn(sentence, RobotWarning, stacklevel=3)
+    return made
 
 
 def _plain(value: Any) -> Any:
@@ -148,8 +165,6 @@ class Robot:
     def forward(self, q: Any) -> Any:
         """Where the robot puts its tool: ``predict(self, q)``. ``q`` is a table with a column for every joint, as
         ``q1_deg`` or ``q1_rad``; a dict of numbers is one pose."""
-        from llmt.robotics._tasks import predict
-
         if isinstance(q, Mapping):
             q = {name: [value] if np.ndim(value) == 0 else value for name, value in q.items()}
         return predict(self, q)
@@ -182,3 +197,19 @@ class Robot:
 def robot(source: Any, *, base_link: str = "", tip_link: str = "") -> Robot:
     """The robot of a URDF or YAML file, of the text of one, or of a dict; see :class:`Robot`. A robot is itself."""
     return source if isinstance(source, Robot) else Robot(source, base_link=base_link, tip_link=tip_link)
+
+
+def predict(
+    robot: Any, poses: Any, *, as_measured: bool = False, columns: Any = None, decimal_comma: bool = False
+) -> Any:
+    """Where a robot puts its tool, as a table: ``llmt-robot predict``.
+
+    ``poses`` is a table with joint values and the covariates of the effects. The result has the joint values under the
+    same names, ``x_mm``, ``y_mm``, ``z_mm`` and the orientation. With ``as_measured`` errors of the instrument and its
+    session stay in: what would be read, not where the tool is.
+    """
+    arm = robot if isinstance(robot, Robot) else Robot(robot)
+    made = _extension().predict(
+        arm._bound, source_of(poses, "poses"), _reading(columns, False, decimal_comma), as_measured=bool(as_measured)
+    )
+    return frame_of(_warned(made)["csv"])

@@ -22,7 +22,7 @@ from llmt._files import write_text
 from llmt._results import names, number
 from llmt.robotics._csv import Source, frame_of, source_of
 from llmt.robotics._results import Calibration, Check, Commands, Discovery, PoseChoice
-from llmt.robotics._robot import RobotWarning, _extension
+from llmt.robotics._robot import RobotWarning, _extension, _reading, _warned
 from llmt.robotics._robot import robot as _robot_of
 
 Progress = Callable[[int, int, str], Any]
@@ -32,24 +32,8 @@ _LARGEST = 1.7976931348623157e308
 _SMALLEST = 5e-324
 
 
-def _reading(columns: Any, orientations: bool = False, decimal_comma: bool = False) -> Any:
-    source: Source | None = None
-    if isinstance(columns, Mapping):
-        whole = columns if isinstance(columns.get("columns"), Mapping) else {"columns": dict(columns)}
-        source = ("<columns>", json.dumps(whole))
-    elif columns is not None:
-        source = (os.fspath(columns), None)
-    return _extension().Reading(source, bool(orientations), bool(decimal_comma))
-
-
 def _optional(table: Any, what: str) -> Source | None:
     return None if table is None else source_of(table, what)
-
-
-def _warned(made: dict[str, Any]) -> dict[str, Any]:
-    for sentence in made["warnings"]:
-        _warnings.warn(sentence, RobotWarning, stacklevel=3)
-    return made
 
 
 def _checked(source: Source, columns: Any, arm: Any) -> Source:
@@ -473,22 +457,6 @@ def simulate(robot: Any, poses: Any = 200, *, noise_um: float = 0.0, seed: int =
         _reading(None, False, decimal_comma),
         noise_um=number("noise_um", noise_um, 0.0, _LARGEST),
         seed=number("seed", seed, 0, 2**64 - 1, whole=True),
-    )
-    return frame_of(_warned(made)["csv"])
-
-
-def predict(
-    robot: Any, poses: Any, *, as_measured: bool = False, columns: Any = None, decimal_comma: bool = False
-) -> Any:
-    """Where a robot puts its tool, as a table: ``llmt-robot predict``.
-
-    ``poses`` is a table with joint values and the covariates of the effects. The result has the joint values under the
-    same names, ``x_mm``, ``y_mm``, ``z_mm`` and the orientation. With ``as_measured`` errors of the instrument and its
-    session stay in: what would be read, not where the tool is.
-    """
-    arm = _robot_of(robot)
-    made = _extension().predict(
-        arm._bound, source_of(poses, "poses"), _reading(columns, False, decimal_comma), as_measured=bool(as_measured)
     )
     return frame_of(_warned(made)["csv"])
 
