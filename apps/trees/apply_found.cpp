@@ -228,17 +228,12 @@ void write_code(const std::string& path, const report::FoundTerms& found) {
       path, report::correction_code(found, extension == ".c" ? report::CodeLanguage::c : report::CodeLanguage::python));
 }
 
-void apply_command(const CLI::App& command, ApplyArguments arguments, const std::vector<std::string>& outputs) {
+void apply_command(const CLI::App& command, const ApplyArguments& arguments) {
   for (const char* option : {"--target", "--inputs", "--order", "--terms", "--allow", "--held-out", "--only",
                              "--without", "--own-terms-only", "--input-noise", "--seed"}) {
     if (command.get_option(option)->count() > 0) {
       throw std::invalid_argument(fmt::format("--apply excludes {}: what was found says it", option));
     }
-  }
-  if (outputs.size() > 1) throw std::invalid_argument(fmt::format("--output names {} files", outputs.size()));
-  if (!outputs.empty()) {
-    check_output_file(command, "--output", outputs.front());
-    arguments.corrected = outputs.front();
   }
   apply_found(arguments);
 }

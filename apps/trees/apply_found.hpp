@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
-#include <vector>
 
 #include "llmt/csv.hpp"
 #include "report/terms/found_terms.hpp"
@@ -25,10 +24,9 @@ struct ApplyArguments {
   bool json = false;
 };
 
-/// Applies what was found, writes, and prints the gap before and after where there are measured outputs. `outputs`:
-/// what
-/// --output names. Throws std::invalid_argument for options of the search, which the file of what was found stands for.
-void apply_command(const CLI::App& command, ApplyArguments arguments, const std::vector<std::string>& outputs);
+/// Applies what was found, writes, and prints the gap before and after where there are measured outputs. Throws
+/// std::invalid_argument for options of the search, which the file of what was found stands for.
+void apply_command(const CLI::App& command, const ApplyArguments& arguments);
 
 /// Writes the correction as a function, in the language of the path's extension, .c or .py. Throws
 /// std::invalid_argument for another one.

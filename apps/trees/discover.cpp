@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <functional>
 #include <memory>
-#include <sstream>
 #include <stdexcept>
 
 #include "llmt/csv.hpp"
@@ -31,7 +30,6 @@ struct DiscoverArguments : ComparedTables {
   std::vector<std::string> only;
   std::vector<std::string> without;
   std::vector<std::string> input_noise;
-  std::vector<std::string> outputs_or_files;  // of --output, which once named the columns
   std::string corrected;
   SimulationArguments simulation;
   bool own_terms_only = false;
@@ -144,48 +142,21 @@ report::TermsSummary discovered(const DiscoverArguments& arguments, const Compar
   return summary;
 }
 
-// Sorts the values of --output into the file to write and, where no target is named, the columns to explain: the option
-// once meant these.
-void sort_outputs(const CLI::App& command, DiscoverArguments& arguments) {
-  std::vector<std::string> files = arguments.outputs_or_files;
-  if (arguments.outputs.empty() && !files.empty()) {
-    const Csv simulated = Csv::read(arguments.simulated, arguments.mark);
-    const auto is_column = [&](const std::string& name) { return simulated.has(name); };
-    for (const std::string& text : arguments.outputs_or_files) {
-      std::vector<std::string> names;
-      std::istringstream parts(text);
-      for (std::string name; std::getline(parts, name, ',');) names.push_back(name);
-      if (!std::ranges::all_of(names, is_column)) continue;
-      warn(fmt::format("llmt: --output {} is taken for the columns to explain, as in former versions; write --target",
-                       text));
-      arguments.outputs.insert(arguments.outputs.end(), names.begin(), names.end());
-      std::erase(files, text);
-    }
-  }
-  if (arguments.outputs.empty()) throw std::invalid_argument("--target is needed: the columns to explain");
-  if (files.size() > 1) throw std::invalid_argument(fmt::format("--output names {} files", files.size()));
-  if (files.empty()) return;
-  check_output_file(command, "--output", files.front());
-  arguments.corrected = files.front();
-}
-
 void discover_command(const CLI::App& command, DiscoverArguments arguments) {
   check(arguments.simulation);
   if (!arguments.simulation.apply.empty()) {
     if (arguments.reports.wanted()) throw std::invalid_argument("--apply makes no report");
-    apply_command(command,
-                  {.found = arguments.simulation.apply,
-                   .simulated = arguments.simulated,
-                   .measured = arguments.measured,
-                   .time = arguments.time,
-                   .group = arguments.group,
-                   .parameters = arguments.simulation.parameters,
-                   .parameters_are_set = arguments.simulation.parameters_are_set,
-                   .corrected = "",
-                   .code = arguments.simulation.code,
-                   .mark = arguments.mark,
-                   .json = arguments.json},
-                  arguments.outputs_or_files);
+    apply_command(command, {.found = arguments.simulation.apply,
+                            .simulated = arguments.simulated,
+                            .measured = arguments.measured,
+                            .time = arguments.time,
+                            .group = arguments.group,
+                            .parameters = arguments.simulation.parameters,
+                            .parameters_are_set = arguments.simulation.parameters_are_set,
+                            .corrected = arguments.corrected,
+                            .code = arguments.simulation.code,
+                            .mark = arguments.mark,
+                            .json = arguments.json});
     return;
   }
   const bool simulates = !arguments.simulation.command.empty();
@@ -197,7 +168,7 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
     arguments.measured = arguments.simulated;
   }
   if (arguments.measured.empty()) throw CLI::RequiredError("measured");
-  sort_outputs(command, arguments);
+  if (arguments.outputs.empty()) throw std::invalid_argument("--target is needed: the columns to explain");
   const bool named = !arguments.inputs.empty();
   if (!named) {
     const Csv simulated = Csv::read(arguments.simulated, arguments.mark);
@@ -294,9 +265,7 @@ void add_discover(CLI::App& app) {
       ->capture_default_str();
   add_seed(*command, arguments->options.seed, "Of the rows set aside");
   add_decimal_comma(*command, arguments->mark);
-  command->add_option("-o,--output,--corrected", arguments->outputs_or_files, "Corrected simulation to write (CSV)")
-      ->type_name("NEWFILE")
-      ->allow_extra_args(false);
+  add_output_file(*command, "-o,--output", arguments->corrected, "Corrected simulation to write (CSV)");
   add_report_options(*command, arguments->reports, "the gap before and after");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback([command, arguments] { discover_command(*command, *arguments); });

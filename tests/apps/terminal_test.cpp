@@ -140,26 +140,6 @@ TEST(Arguments, InputsByAccidentAreNamed) {
   EXPECT_EQ(folder.run(llmt_program + " fit d.csv -t y --ignore id --categorical name").err, "");
 }
 
-TEST(Arguments, TheOutputOfDiscoverMayStillNameTheColumns) {
-  const Folder folder;
-  std::string simulated = "a,y\n";
-  std::string measured = "a,y\n";
-  for (int i = 0; i < 80; ++i) {
-    const double a = 0.1 * ((7 * i) % 81);
-    simulated += fmt::format("{},{}\n", a, a);
-    measured += fmt::format("{},{}\n", a, a + 0.3 * a * a);
-  }
-  folder.write("s.csv", simulated);
-  folder.write("m.csv", measured);
-  const std::string command = llmt_program + " discover s.csv m.csv ";
-  const Outcome now = folder.run(command + "--target y --output c.csv");
-  const Outcome then = folder.run(command + "--output y -o d.csv");
-  EXPECT_EQ(now.exit_code, 0) << now.err;
-  EXPECT_EQ(then.err, "llmt: --output y is taken for the columns to explain, as in former versions; write --target\n");
-  EXPECT_EQ(llmt::read_file(folder.file("c.csv")), llmt::read_file(folder.file("d.csv")));
-  EXPECT_EQ(folder.run(command).err, "llmt: --target is needed: the columns to explain\n");
-}
-
 TEST(Help, FitsTheTerminalAndHidesOptionsForExperts) {
   const Folder folder;
   for (const char* program : {LLMT_PROGRAM}) {

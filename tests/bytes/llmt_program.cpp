@@ -71,9 +71,9 @@ void witness_llmt(const std::string& folder, Results& results) {
   add_threads("explain", "explain plain.json queries.csv --json", {});
   add_threads("explain_row", "explain two.json queries.csv --row 3 --json", {});
   add_threads("compare", "compare plain.csv -t y --ignore z --cv 2 --json", {});
-  add("discover", "discover s.csv m.csv --inputs a,b,t --output y -o corrected.csv --json", {"corrected.csv"});
-  add("discover_own_term", "discover s.csv m.csv --output y --terms own.txt --own-terms-only --json");
-  add("discover_nothing", "discover s.csv s.csv --output y --json");
+  add("discover", "discover s.csv m.csv --inputs a,b,t --target y -o corrected.csv --json", {"corrected.csv"});
+  add("discover_own_term", "discover s.csv m.csv --target y --terms own.txt --own-terms-only --json");
+  add("discover_nothing", "discover s.csv s.csv --target y --json");
   add("no_such_target", "fit plain.csv -t nothing --json");
   add("no_such_rule", "fit plain.csv -t y --rule nothing --json");
 }

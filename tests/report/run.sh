@@ -39,7 +39,7 @@ make "$llmt" fit two.csv --target flow --report fit_two.html
 make "$llmt" fit many.csv --target y,z --report fit_many.html
 make "$llmt" fit two.csv --target flow --cv 0 --report fit_no_folds.html
 make "$llmt" compare two.csv --target flow --report compare.html
-make "$llmt" discover simulated.csv measured.csv --output power --report discover.html
+make "$llmt" discover simulated.csv measured.csv --target power --report discover.html
 make "$robot" calibrate "$robots/ur10.yaml" ur10.csv --correct --report calibrate.html
 make "$robot" calibrate rigid.yaml planar.csv --folds 0 --report calibrate_planar.html
 make "$robot" discover rigid.yaml planar.csv --report robot_discover.html
