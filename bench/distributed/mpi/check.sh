@@ -1,5 +1,5 @@
 #!/bin/sh
-# tests/mpi/check.sh LLMT LLMT_MPI [KILLS]: fits of a table by 1, 2, 4, 7, 9 processes have the bytes of llmt fit; so have
+# bench/distributed/mpi/check.sh LLMT LLMT_MPI [KILLS]: fits of a table by 1, 2, 4, 7, 9 processes have the bytes of llmt fit; so have
 # fits of which a process was killed at one of KILLS moments, gone on with from their checkpoints. A job whose process was
 # killed leaves no model, and one with a wrong table or a process that waits for ever ends.
 set -eu

@@ -3,8 +3,8 @@
 
 #include <chrono>
 
+#include "distributed/mpi/mpi_processes.hpp"
 #include "llmt/arrow.hpp"
-#include "mpi/mpi_processes.hpp"
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
 #include "shared/options.hpp"

@@ -1,4 +1,4 @@
-#include "mpi/mpi_processes.hpp"
+#include "distributed/mpi/mpi_processes.hpp"
 
 #include <fmt/format.h>
 #include <mpi.h>
