@@ -15,7 +15,6 @@ MODULES = [
     "llmt.mujoco",
     "llmt.robotics",
     "llmt.samples",
-    "llmt.srbench",
 ]
 
 

@@ -1,13 +1,18 @@
 """What people read: expressions of sympy and of SRBench, and LaTeX, against `llmt predict`."""
 
 import json
+import pathlib
 import re
+import sys
 
 import numpy as np
 import pytest
 from fitted_models import assert_same, constants, every_model, fitted, function_of  # noqa: F401
 
 from llmt.export import to_latex, to_sympy
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "bench/python"))
+import srbench  # noqa: E402
 
 # sympy
 
@@ -146,8 +151,6 @@ def test_srbench_model_evaluates_to_the_prediction(fitted, name):
     from sympy import Symbol, lambdify
     from sympy.parsing.sympy_parser import parse_expr
 
-    from llmt import srbench
-
     model = fitted(name)
     _, space = function_of(model.model)
     inside = [i for i in model.of("training", "threshold") if within_the_ranges(space, model.rows[i])]
@@ -165,16 +168,12 @@ def test_srbench_model_evaluates_to_the_prediction(fitted, name):
 
 def test_srbench_complexity():
     pytest.importorskip("sympy")
-    from llmt import srbench
-
     # Piecewise, of two pairs: (1.5, x0 <= 2) and (2.5, true)
     assert srbench.complexity(Estimator(constants())) == 1 + (1 + 1 + 3) + (1 + 1 + 1)
     assert srbench.model(Estimator(constants())) == "Piecewise((1.5, x <= 2), (2.5, True))"
 
 
 def test_srbench_writes_as_people_do():
-    from llmt import srbench
-
     model = constants()
     model["regressors"] = [{"column": 0, "centre": 2.0}]
     for node, slope in zip(model["partitions"][0]["nodes"], (0.0, -1.0, 0.25)):
@@ -186,8 +185,6 @@ def test_srbench_writes_as_people_do():
 
 
 def test_srbench_refuses(fitted):
-    from llmt import srbench
-
     with pytest.raises(ValueError, match="category of words"):
         srbench.model(Estimator(fitted("readable_words").model))
     with pytest.raises(ValueError, match="2 outputs"):

@@ -1,25 +1,27 @@
 """SRBench's interface to readable, crisp trees (La Cava et al. 2021): `est`, `model(est)`, `complexity(est)`.
 
-from llmt.srbench import est, model, complexity
-est.fit(X, y)
-model(est)       # "Piecewise((1.2 + 0.5*x0, x0 <= 3), (2.7, True))"
-complexity(est)  # 10
+With this folder in PYTHONPATH beside the package:
+
+    from srbench import est, model, complexity
+    est.fit(X, y)
+    model(est)       # "Piecewise((1.2 + 0.5*x0, x0 <= 3), (2.7, True))"
+    complexity(est)  # 10
 """
 
 import json
 import keyword
 from typing import Any
 
-from .export.model import Model, read
-from .export.needed import needed
-from .export.sympy_expression import texts
+from llmt.export.model import Model, read
+from llmt.export.needed import needed
+from llmt.export.sympy_expression import texts
 
 eval_kwargs: dict[str, Any] = {}
 
 
 def __getattr__(name: str) -> Any:
-    if name == "est":  # made when asked for: the names above need no compiled part
-        from ._estimator import LocalLinearTreeRegressor
+    if name == "est":  # made when asked for: the functions need no compiled part
+        from llmt import LocalLinearTreeRegressor
 
         return LocalLinearTreeRegressor(readable=True)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
