@@ -19,7 +19,7 @@ cp docs/site/mkdocs.yml build/site
 cp CONTRIBUTING.md CHANGELOG.md CITATION.cff LICENSE $pages
 cp README.md $pages/index.md
 for linked in bench/logs/tx40.py cmake/packages cmake/setup robotics/catalogue.yaml tests/CMakeLists.txt tests/consumer \
-  tests/bytes/manifest.txt tests/python/requirements.txt; do
+  tests/bytes/manifest.txt tests/measures/table.md tests/python/requirements.txt; do
   mkdir -p "$pages/${linked%/*}"
   cp -r $linked $pages/$linked
 done

@@ -1,10 +1,9 @@
-// The defaults of the library, of the help text and of docs/commands.md are the same.
+// The defaults of the library are those of the help text, from which docs/options.md is made.
 #include <fmt/format.h>
 
 #include <sstream>
 
 #include "apps/program.hpp"
-#include "llmt/files.hpp"
 #include "llmt/options.hpp"
 
 namespace {
@@ -17,20 +16,17 @@ std::string on_one_line(const std::string& text) {
   return line;
 }
 
-TEST(Defaults, HelpAndCommandsPageStateThoseOfTheLibrary) {
+TEST(Defaults, HelpStatesThoseOfTheLibrary) {
   const program::Folder folder;
   const std::string help = on_one_line(folder.run(LLMT_PROGRAM " fit --help-all").out);
-  const std::string page = llmt::read_file(LLMT_DOCS "/commands.md");
   for (const char* option :
        {"max_leaves", "min_leaf_samples", "significance", "widths", "jumps", "ridges", "shrinkages"}) {
     const std::string text = llmt::default_text(option);
     EXPECT_NE(help.find("[" + text + "]"), std::string::npos) << option << ": " << text << "\n" << help;
-    EXPECT_NE(page.find(": " + text), std::string::npos) << option << ": " << text;
   }
   for (const llmt::Choice<llmt::GrowthRule>& rule : llmt::choices<llmt::GrowthRule>()) {
     if (rule.name == "toy") continue;  // a rule of these tests, which the program does not have
     EXPECT_NE(help.find(fmt::format("{} ({})", rule.name, llmt::summary_of(rule.value))), std::string::npos);
-    EXPECT_NE(page.find(fmt::format("`{}`", rule.name)), std::string::npos);
   }
 }
 

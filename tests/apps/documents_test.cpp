@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <map>
-#include <regex>
 #include <sstream>
 #include <vector>
 
@@ -87,52 +85,6 @@ INSTANTIATE_TEST_SUITE_P(All, Documents, testing::Values("README.md", "docs/regr
                            for (char& c : text) c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
                            return text;
                          });
-
-// A part of docs/commands.md: that of a command, or what stands before all commands.
-std::string commands_part(const std::string& command) {
-  const std::string text = llmt::read_file(LLMT_ROOT "/docs/commands.md");
-  const std::size_t begin = command.empty() ? 0 : text.find("\n## " + command);
-  EXPECT_NE(begin, std::string::npos) << command;
-  return text.substr(begin, text.find("\n## ", begin + 1) - begin);
-}
-
-// Options of a command and their defaults as help has them, empty where it has none.
-std::map<std::string, std::string> options_of(const std::string& help) {
-  std::map<std::string, std::string> options;
-  std::string name;
-  for (const std::string& line : lines_of(help)) {
-    std::smatch match;
-    static const std::regex option("^  (-[a-z],)?(--[a-z-]+).*");
-    static const std::regex number(".*\\[([0-9.]+)\\]$");
-    if (std::regex_match(line, match, option)) name = match[2];
-    if (name.empty() || line.empty()) continue;
-    std::string& value = options[name];
-    if (std::regex_match(line, match, number)) value = match[1];
-  }
-  for (const char* general : {"--help", "--help-all", "--version"}) options.erase(general);
-  return options;
-}
-
-TEST(Commands, EveryOptionIsDocumentedWithItsDefault) {
-  const program::Folder folder;
-  const std::string general = commands_part("");
-  for (const std::string command :
-       {"llmt fit", "llmt predict", "llmt inspect", "llmt explain", "llmt compare", "llmt discover", "llmt export",
-        "llmt-robot calibrate", "llmt-robot discover", "llmt-robot simulate", "llmt-robot poses", "llmt-robot check",
-        "llmt-robot demo", "llmt-robot predict", "llmt-robot compensate", "llmt-robot export", "llmt-robot mechanism",
-        "llmt-robot paper"}) {
-    std::string part = commands_part(command);
-    if (command == "llmt compare") part += commands_part("llmt fit");  // whose options it takes
-    for (const auto& [name, value] : options_of(folder.run(runnable(command + " --help-all")).out)) {
-      const std::regex as_word(name + "(?![a-z-])");
-      const bool is_here = std::regex_search(part, as_word);
-      EXPECT_TRUE(is_here || std::regex_search(general, as_word)) << command << " " << name;
-      if (value.empty()) continue;
-      const std::regex the_default("[^\\d.]" + value + "(?![\\d])");
-      EXPECT_TRUE(std::regex_search(is_here ? part : general, the_default)) << command << " " << name << " " << value;
-    }
-  }
-}
 
 TEST(DocumentLines, DifferWhereALineDoes) {
   EXPECT_TRUE(agree({"a", "b", "c"}, 0, {"a", "...", "c"}, 0));
