@@ -103,7 +103,7 @@ bool read_some(int file, std::string& text) {
   return got > 0 || (got < 0 && (errno == EAGAIN || errno == EINTR));
 }
 
-// Whether it has ended. It is left to be waited for, so that no other process gets its number.
+// True if the child has ended. It is left to be waited for, so that no other process gets its number.
 bool is_over(pid_t child) {
   siginfo_t info = {};
   return ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == child;
@@ -149,7 +149,7 @@ ChildOutcome run_child(const std::string& command, std::string_view input, doubl
     if (ready > 0 && files[2].revents != 0 && !read_some(err.end(0), outcome.err)) err.close(0);
     keep_last(outcome.err);
     outcome.overflowed = outcome.out.size() > longest_output;
-    // What it wrote before it ended was there to be read.
+    // The child had ended before poll() found nothing, so all that it wrote has been read.
     if (has_ended && files[1].revents == 0 && files[2].revents == 0) break;
     has_ended = has_ended || is_over(child);
     outcome.timed_out = Clock::now() > end && !has_ended;

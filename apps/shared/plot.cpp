@@ -65,7 +65,7 @@ std::string value_text(double value) { return std::isfinite(value) ? fmt::format
 
 double at(const Numbers& values, std::size_t k, double otherwise) { return values.empty() ? otherwise : values[k]; }
 
-// Where bars begin that would begin at 0: on a logarithmic axis a little below the shortest.
+// The start of bars that would begin at 0: on a logarithmic axis a little below the shortest.
 double start_of_bars(const Chart& chart) {
   if (!chart.y.log) return -std::numeric_limits<double>::infinity();
   double least = std::numeric_limits<double>::infinity();

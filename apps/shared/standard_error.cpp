@@ -39,7 +39,8 @@ void occupy_closed_standard_files() {
     const char* device;
     int mode;
   };
-  // Of input and output in the wrong direction; where /dev/stdout is opened anew, /dev/full takes nothing.
+  // Input and output are opened in the wrong direction, so that they fail. /dev/full takes nothing even if /dev/stdout
+  // is opened anew.
   constexpr std::array<Place, 3> places = {{{STDIN_FILENO, "/dev/null", O_WRONLY},
                                             {STDOUT_FILENO, "/dev/full", O_RDONLY},
                                             {STDERR_FILENO, "/dev/null", O_WRONLY}}};

@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* standard_input = "standard input";
 
-// Whether the header has only numbers. Those of columns, from 0 or 1 on, are names.
+// True if the header has only numbers, and these do not count the columns from 0 or 1 on.
 bool looks_like_a_row(const Csv& csv) {
   std::vector<double> numbers;
   for (std::string name : csv.columns()) {

@@ -27,7 +27,7 @@ class RowsInOrder {
   /// Throws std::runtime_error if the first file cannot be read.
   RowsInOrder(std::vector<std::string> paths, NumberFormat format);
 
-  /// Of the first file; the others must have the same, in the same order.
+  /// The columns of the first file; the others must have the same, in the same order.
   const std::vector<std::string>& columns() const { return columns_; }
 
   /// At least one row; nothing at the end.

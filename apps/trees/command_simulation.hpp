@@ -22,7 +22,7 @@ struct CommandSimulation {
   std::vector<std::string> outputs;
   std::vector<LabelColumn> labels = {};  ///< times and runs of the rows
 
-  /// Of the parameters.
+  /// Nominal values of the parameters.
   Eigen::VectorXd nominal() const;
 
   /// n x d. Throws std::runtime_error that names the command, the values, and what went wrong: an exit code, a signal,

@@ -37,7 +37,7 @@ void warn_if_not_finite(const ExplainArguments& arguments, const char* what, con
   }
 }
 
-// What trees and sums of trees are explained from.
+// Sums of trees are explained against the mean over at most this many rows.
 constexpr Eigen::Index most_background = 100;
 
 std::string mean_over(Eigen::Index rows) { return fmt::format("on average over {} rows of the table", rows); }

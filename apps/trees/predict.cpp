@@ -24,7 +24,7 @@
 namespace llmt::apps {
 namespace {
 
-// What trees and sums of trees say of the rows alike.
+// The part of the predictions that trees and sums of trees have in common.
 template <class AnyModel>
 report::Prediction predict_values(const PredictArguments& arguments, const AnyModel& model,
                                   const report::ModelInputs& inputs) {

@@ -27,7 +27,7 @@ using Schema = Owned<ArrowSchema>;
 using Chunk = Owned<ArrowArray>;
 using RowStream = Owned<ArrowArrayStream>;
 
-// What a capsule holds, taken away from it.
+// Takes the structure out of a capsule, which is then empty.
 template <class Struct>
 Owned<Struct> taken(const nb::object& capsule, const char* name) {
   auto* const held = static_cast<Struct*>(PyCapsule_GetPointer(capsule.ptr(), name));
@@ -146,7 +146,7 @@ class ArrowTable {
     return values;
   }
 
-  // Of each column its name, what it is, and its words or None.
+  // A tuple for each column: its name, its kind, and its words or None.
   nb::list columns() const {
     nb::list result;
     for (const ColumnOfTable& column : columns_) {

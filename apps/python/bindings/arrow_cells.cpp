@@ -155,7 +155,7 @@ std::string_view text_at(const ArrowArray& array, const CellType& type, std::int
   }
 }
 
-// What belongs to the cells `first` ... of an array whose own offset is not yet counted.
+// Writes the cells `first` ... of an array, whose own offset is added here.
 template <class Read>
 void fill(const ArrowArray& array, std::int64_t first, std::int64_t rows, double* out, Read&& read) {
   const void* const valid = array.n_buffers > 0 ? array.buffers[0] : nullptr;

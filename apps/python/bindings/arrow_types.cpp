@@ -28,7 +28,7 @@ struct Refused {
   const char* advice;
 };
 
-// Of two beginnings that fit, the first counts.
+// The first beginning that fits counts.
 constexpr std::array<Refused, 23> refused = {{
     {"td", "dates", from_time},
     {"tt", "times of day", from_time},

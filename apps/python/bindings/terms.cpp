@@ -27,8 +27,8 @@ using report::Json;
 // (name, formula, function of rows of inputs).
 using OwnTerm = std::tuple<std::string, std::string, nb::callable>;
 
-// What both a search and a later prediction are made of. Callables of Python are called with the interpreter's lock on
-// the thread that called; between them the lock is free.
+// The data that a search and a later prediction both need. Callables of Python are called with the interpreter's lock
+// on the thread that called; between them the lock is free.
 struct Question {
   discovery::Inputs inputs;   ///< at which the terms are made
   Eigen::MatrixXd simulated;  ///< there, n x d, at the start of the parameters
@@ -40,7 +40,7 @@ struct Question {
   std::vector<std::string> without;
 };
 
-// What a callable gave for rows of inputs, as a matrix; `what` names it.
+// The result of a callable for rows of inputs, as a matrix; `what` names the callable in messages.
 Eigen::MatrixXd called(const nb::callable& function, const Eigen::MatrixXd& inputs, const nb::object& values,
                        const std::string& what) {
   const nb::object given =
@@ -167,7 +167,7 @@ Question question_of(const Array& inputs, std::vector<std::string> names, std::s
           .without = std::move(without)};
 }
 
-// What corrected() needs of a result.
+// The part of a result that corrected() needs.
 std::string state_of(const discovery::Missing& missing) {
   Json found = Json::array();
   for (const discovery::FoundTerm& term : missing.found) {

@@ -46,7 +46,7 @@ class Words {
     return names;
   }
 
-  // Of each leaf from left to right its node and its conditions.
+  // The node and the conditions of each leaf, from left to right.
   std::vector<std::tuple<int, std::vector<std::string>>> leaves() const {
     std::vector<std::tuple<int, std::vector<std::string>>> result;
     for (const Leaf& leaf : model_.leaves(partition_)) {

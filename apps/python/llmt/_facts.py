@@ -14,7 +14,7 @@ from ._tree import Tree, decimal, number
 
 @dataclass
 class Facts:
-    """Of one partition."""
+    """The facts of one partition."""
 
     heading: str  # "y: 13 leaves with smooth transitions"
     validity: str  # how leaves share the space, a sentence

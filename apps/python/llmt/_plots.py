@@ -164,7 +164,7 @@ def plot_curve(
 
 
 def _commonest(columns: Any, sample: np.ndarray, without: set[str]) -> dict[str, float]:
-    """Of each category its commonest value in the rows."""
+    """The commonest value of each category in the rows."""
     result = {}
     for j, column in enumerate(columns):
         present = sample[~np.isnan(sample[:, j]), j]

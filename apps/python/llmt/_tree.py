@@ -96,7 +96,7 @@ class Tree:
 
     @cached_property
     def is_short(self) -> bool:
-        """Whether all its numbers have few digits, as those of a readable tree have: all are then shown."""
+        """True if every number is short, as in a readable tree; then none is rounded."""
         splits = [node["split"] for node in self.nodes if "split" in node]
         thresholds = [split["threshold"] for split in splits if split.get("threshold", _ANY_VALUE) < _ANY_VALUE]
         if any("direction" in split for split in splits) or not all(map(_is_short, thresholds)):
@@ -246,7 +246,7 @@ def level_names(of: dict[str, Any]) -> list[str]:
 
 
 def _is_short(value: float, beside: float = 0.0) -> bool:
-    """Whether six digits say the number, up to the rounding of a sum of it and `beside`."""
+    """True if six digits give the number, up to the rounding of a sum of it and `beside`."""
     return bool(abs(float(f"{value:.6g}") - value) <= 1e-12 * (abs(value) + beside))
 
 

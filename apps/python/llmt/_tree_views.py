@@ -161,7 +161,7 @@ class TreeViews(Views):
         return tree_html(json.loads(self.model_.to_json()), self.summary_ or None, mean=self._mean, readable=self._is_readable)
 
     def _held_out_rmse(self) -> dict[str, float]:
-        """Of the targets that have a tree of their own and held-out rows."""
+        """The targets that have a tree of their own and held-out rows."""
         return {
             partition["targets"][0]: partition["cv_rmse"]
             for partition in self.summary_.get("partitions", [])

@@ -9,7 +9,7 @@
 namespace llmt::report {
 namespace {
 
-// What a sum consists of. Of a pair, the sum or difference of two inputs, a use counts for both.
+// Numbers of the parts of a sum. A use of a pair, the sum or difference of two inputs, counts for both.
 struct Uses {
   Eigen::Index trees = 0;
   Eigen::Index leaves = 0;

@@ -42,7 +42,7 @@ std::vector<std::string> conditions_of(const std::vector<InputColumn>& inputs, c
 std::vector<std::string> equation(const std::vector<InputColumn>& inputs, const std::vector<Regressor>& regressors,
                                   double intercept, const Eigen::RowVectorXd& slope);
 
-/// The same of a leaf for an output of its partition.
+/// The equation of a leaf for an output of its partition.
 std::vector<std::string> equation(const Model& model, const Leaf& leaf, Eigen::Index output);
 
 /// The name of a column of the local models, as it stands in an equation.

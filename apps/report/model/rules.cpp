@@ -51,7 +51,7 @@ std::string tree_text(const Model& model, const Partition& partition, const std:
     const Open at = open.back();
     open.pop_back();
     const Node& node = partition.nodes[at.node];
-    // Of a deep tree all bars would be more than all the rest.
+    // The bars of a deep tree would be more than all the rest.
     constexpr std::size_t most_bars = 30;
     const std::size_t bars = at.depth > 0 ? at.depth - 1 : 0;
     std::string indent = bars > most_bars ? fmt::format("{} x | ", bars) : "";
@@ -106,8 +106,8 @@ std::string inputs_text(const Model& model, std::size_t width) {
   return text;
 }
 
-// Whether between the smallest and the largest value of each input no guard acts, and a missing value counts as the
-// mean: the model is what the rules say.
+// True if the model is what the rules say: no guard acts between the smallest and the largest value of each input, and
+// a missing value counts as the mean.
 bool says_all(const Model& model) {
   for (const Partition& partition : model.partitions()) {
     if (partition.residual_range.size() > 0) return partition.num_leaves() == 1 && partition.outer_slope.size() == 0;

@@ -11,7 +11,7 @@
 namespace llmt::report {
 namespace {
 
-// What is that small is the rounding of sums and products.
+// Values below `smallest` are rounding errors and are written as 0.
 double without_rounding(double value, double smallest) { return std::abs(value) < smallest ? 0.0 : value; }
 
 // Of the joint's moving frame at zero.

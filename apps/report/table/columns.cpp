@@ -70,7 +70,7 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::ranges::find(names, name) != names.end();
 }
 
-// What to do about the first of the cells that are no numbers: correct them if most cells of the column are numbers.
+// Advice on the first of the cells that are no numbers: correct them if most cells of the column are numbers.
 std::string advice_on_odd_cell(const Csv& csv, std::span<const std::string> columns,
                                const std::vector<ColumnCells>& cells, std::span<const Eigen::Index> first_bad,
                                const ColumnAdvice& advice) {

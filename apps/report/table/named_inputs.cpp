@@ -43,7 +43,7 @@ bool looks_like_a_date(const std::string& text) {
   return ends && (longest == 4 || longest == 2);
 }
 
-// What follows the number that a text begins with; empty if it begins with none, or has nothing behind it.
+// The text behind the number that a text begins with; empty if it begins with none, or has nothing behind it.
 std::string unit_behind_number(const std::string& text) {
   double value = 0.0;
   const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -14,7 +14,7 @@ namespace llmt::report {
 std::vector<int> positions_of(const std::string& option, const std::vector<std::string>& names,
                               const std::vector<std::string>& inputs);
 
-/// Of each input 1, or -1 where its name has a leading minus; 0 where it is not named. Empty if none is. Throws as
+/// A number for each input: 1 if it is named, -1 if with a leading minus, 0 if not. Empty if none is. Throws as
 /// positions_of(), and if an input is named with both signs.
 std::vector<int> signs_of(const std::string& option, const std::vector<std::string>& names,
                           const std::vector<std::string>& inputs);

@@ -61,7 +61,7 @@ std::string outliers_aside(const Missing& missing) {
 std::string parameters_text(const TermsSummary& summary, std::size_t width) {
   const Missing& missing = summary.missing;
   if (missing.fitted_parameters.empty()) return "";
-  // What a fit without the terms would have said shows how much it hides of them.
+  // The column of a fit without the terms shows how much such a fit hides of them.
   const bool beside_terms = !missing.found.empty();
   std::vector<std::string> header = {"parameter", "nominal", "fitted", "change", "+-", "unit", "beyond chance"};
   if (beside_terms) header.emplace_back("without terms");

@@ -40,7 +40,7 @@ Attributions attribute_rows(const BoostedModel& model, const Eigen::Ref<const Ei
                             const Eigen::Ref<const Eigen::MatrixXd>& background, int max_threads = 0,
                             const Progress& progress = {});
 
-/// The same of one row.
+/// attribute() for one row.
 Attribution attribute(const BoostedModel& model, const Eigen::Ref<const Eigen::VectorXd>& point,
                       const Eigen::Ref<const Eigen::MatrixXd>& background);
 

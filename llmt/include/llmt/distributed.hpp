@@ -32,12 +32,12 @@ struct Options {
   /// A branch of the tree with at most this many rows is brought into one memory, where fit() finishes it. At least
   /// 100, and no fewer than sample_rows. A table with no more rows becomes the model of fit(), to the byte.
   Eigen::Index branch_rows = 4'000'000;
-  /// Of the sample that the first pass brings into one memory: bins are cut and a first tree is grown from it. At least
-  /// 100.
+  /// Rows of the sample that the first pass brings into one memory, at least 100. Bins are cut and a first tree is
+  /// grown from it.
   Eigen::Index sample_rows = 131072;
   Eigen::Index block_rows = 65536;  ///< of a block, of which sums are made; see Rows
   bool weighted = false;            ///< whether rows have weights
-  /// Of each input the names of its categories, which its values number from 0 on, as TrainingData::levels; at most
+  /// For each input the names of its categories, which its values number from 0 on, as TrainingData::levels; at most
   /// 255, in all of the table. No names: a number. Empty: all are numbers.
   std::vector<std::vector<std::string>> levels = {};
   /// Of the branches. What start() refuses is not possible beyond one memory; max_threads may differ from pass to pass

@@ -19,10 +19,10 @@ struct FileLimit {
   std::uintmax_t line_bytes = std::numeric_limits<std::uintmax_t>::max();  ///< of a line: no limit of its own
 };
 
-/// Of a file that people write: a robot description, a catalogue, terms. 16 MiB.
+/// The limit for a file that people write, such as a robot description, a catalogue or terms: 16 MiB.
 inline constexpr FileLimit description_limit{.bytes = std::uintmax_t{1} << 24};
 
-/// Of a model: 256 MiB. A leaf of 1000 inputs takes 13 MB.
+/// The limit for a model: 256 MiB. A leaf of 1000 inputs takes 13 MB.
 inline constexpr FileLimit model_limit{.bytes = std::uintmax_t{1} << 28};
 
 /// The bytes of a file. Throws std::runtime_error `path: cannot be read: reason`, also beyond the limit.

@@ -51,7 +51,7 @@ class Intervals {
   bool empty() const { return models_.empty(); }
   const std::vector<Model>& models() const { return models_; }
   const std::vector<Eigen::MatrixXd>& residuals() const { return residuals_; }  ///< each column ascending
-  /// The same of the rows that lack an input; one matrix for each fold.
+  /// Residuals of the rows that lack an input; one matrix for each fold.
   const std::vector<Eigen::MatrixXd>& incomplete_residuals() const { return incomplete_; }
 
   /// Intervals that contain the fraction `level` (0.9, for example) of the outputs. Throws std::invalid_argument if

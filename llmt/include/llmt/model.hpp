@@ -147,7 +147,7 @@ class Model {
   std::shared_ptr<const std::vector<Evaluator>> evaluators_;  // one per partition
 };
 
-/// Of each input of a model, whether a split or the local model of a leaf uses it.
+/// True for each input that a split or the local model of a leaf uses.
 std::vector<bool> used_inputs(const Model& model);
 
 /// The model as JSON text; docs/file-formats.md describes it. Format version 2, or 3 if there is an output_range, which

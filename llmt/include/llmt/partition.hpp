@@ -70,9 +70,9 @@ struct Node {
   Eigen::VectorXd rss;    ///< weighted residual sum of squares over those rows, one per output of the partition
   Eigen::VectorXd value;  ///< local model at the centre of the regressors, one per output of the partition
   Eigen::MatrixXd slope;  ///< d output / d regressor, outputs of the partition x regressors
-  /// Of each regressor, as a deviation from its centre: the mean over the node's rows, which stands in for a missing
-  /// value, and the range over the rows that its validity reaches. Beyond the range the ancestors' slopes take over
-  /// (docs/algorithms/guards.md, B.2).
+  /// Mean and range of each regressor, as deviations from its centre. The mean is that over the node's rows, and stands
+  /// in for a missing value. The range is that over the rows that the node's validity reaches. Beyond the range the
+  /// ancestors' slopes take over (docs/algorithms/guards.md, B.2).
   Eigen::VectorXd mean;
   Eigen::VectorXd low;
   Eigen::VectorXd high;

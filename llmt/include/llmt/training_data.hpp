@@ -38,7 +38,7 @@ struct TrainingData {
   /// fit deals folds, and fits to all rows.
   std::vector<Eigen::Index> held_out = {};
   std::vector<int> categorical_inputs = {};  ///< columns whose values are categories 0, 1, 2, ...
-  /// Of each input the names of its categories, which its values number from 0 on. No names: a number, or categories
+  /// For each input the names of its categories, which its values number from 0 on. No names: a number, or categories
   /// without names. An input with names is categorical. A category above the largest one that takes part in the fit is
   /// not in the model, and counts as a missing value there.
   std::vector<std::vector<std::string>> levels = {};

@@ -19,7 +19,7 @@ LLMT_DECOMPOSITION LDLT<MatrixXd>& LDLT<MatrixXd>::compute(const EigenBase<Matri
 LLMT_DECOMPOSITION SelfAdjointEigenSolver<MatrixXd>& SelfAdjointEigenSolver<MatrixXd>::compute(
     const EigenBase<MatrixXd>&, int);
 
-// What `solve` is made of.
+// `solve` calls these.
 LLMT_DECOMPOSITION void ColPivHouseholderQR<MatrixXd>::_solve_impl(const VectorXd&, VectorXd&) const;
 LLMT_DECOMPOSITION void CompleteOrthogonalDecomposition<MatrixXd>::_solve_impl(const VectorXd&, VectorXd&) const;
 LLMT_DECOMPOSITION void LLT<MatrixXd>::_solve_impl(const VectorXd&, VectorXd&) const;

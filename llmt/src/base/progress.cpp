@@ -5,7 +5,7 @@
 
 namespace llmt {
 
-// What all parts of the work of a call share.
+// The state that all parts of the work of a call share.
 struct Work::Root {
   static constexpr int total = 1000;
 

@@ -22,7 +22,7 @@
 
 /// Makes a function part of each function that calls it, so that it is compiled for the caller's instruction set.
 #define LLMT_INLINE inline __attribute__((always_inline))
-/// The same of a lambda, behind its parameters.
+/// LLMT_INLINE for a lambda; it stands behind the parameters.
 #define LLMT_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace llmt {

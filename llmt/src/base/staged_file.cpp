@@ -128,7 +128,7 @@ void StagedFile::check(bool done) {
 void StagedFile::open(mode_t mode) {
   file_ = open_nameless(folder_, mode);
   if (file_.is_open()) return;
-  // What file systems without nameless files answer; any other error is final.
+  // File systems without nameless files answer with one of these errors; any other one is final.
   check(errno == EOPNOTSUPP || errno == EISDIR || errno == EINVAL || errno == ENOSYS);
   temporary_.announce();
   file_ = Descriptor(::open(temporary_.path(), O_CREAT | O_EXCL | O_NOFOLLOW | O_WRONLY | O_CLOEXEC, mode));

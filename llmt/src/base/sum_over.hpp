@@ -62,7 +62,7 @@ class BlockSums {
     if (parts_.empty() || parts_.front().first != 0 || parts_.back().end() != blocks) {
       throw std::invalid_argument("llmt: sums of some blocks are missing");
     }
-    // What stands alone at the end of the rows goes up to where the tree has something beside it.
+    // The parts at the end of the rows that have no neighbour of their size are merged from the smallest one on.
     for (; parts_.size() > 1; parts_.pop_back()) merge(parts_[parts_.size() - 2].sum, std::move(parts_.back().sum));
     return std::move(parts_.front().sum);
   }

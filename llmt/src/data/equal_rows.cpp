@@ -20,7 +20,8 @@ namespace {
 // are cells of a table of few values.
 constexpr double most_repeats = 10.0;
 
-// Where fewer rows than this have another one, new rows will have one as often as held-out rows do.
+// Rows with equal inputs are repeats only if there are at least 1 + this of them on average. If there are fewer, new
+// rows will have an equal one as often as held-out rows do.
 constexpr double fewest_repeats = 0.2;
 
 // Part of the rows that meet in half of the inputs and in all of them.
@@ -30,9 +31,8 @@ constexpr double part_that_meets = 0.5;
 // by chance, and can hardly be dealt to folds.
 constexpr int fewest_different = 10;
 
-// Rows that are hashed at a time. Hashes are sorted in parts, by this many of their first bits.
-constexpr Eigen::Index rows_at_once = 16384;
-constexpr int bits_of_part = 4;
+constexpr Eigen::Index rows_at_once = 16384;  // rows that are hashed at a time
+constexpr int bits_of_part = 4;               // hashes with the same first bits are sorted together
 
 std::vector<int> sizes_of(const std::vector<int>& numbers) {
   std::vector<int> sizes(numbers.size(), 0);
@@ -84,14 +84,15 @@ bool are_repeats(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vec
   return size - 1.0 >= part_that_meets * (std::min(size_by(0), size_by(1)) - 1.0);
 }
 
-// How often a table was written if every row stands there so often, or a multiple of it.
+// The number of times that a table was written one after the other: the greatest common divisor of the numbers of equal
+// rows.
 int times_written(const std::vector<int>& by_all) {
   int times = 0;
   for (const int size : sizes_of(by_all)) times = std::gcd(times, size);
   return times;
 }
 
-// Of each row the one that it copies, itself if none: of rows that are the same, one of `times` is left, at least one.
+// For each row the row that it copies, or itself. Of equal rows every `times`-th one stays, at least one.
 std::vector<int> copies(const std::vector<int>& by_all, int times) {
   const std::vector<int> sizes = sizes_of(by_all);
   std::vector<std::vector<int>> left(by_all.size());

@@ -33,9 +33,9 @@ RowNumbers at(const RowNumbers& numbers, const std::vector<Eigen::Index>& positi
 /// Rows that are no measurements of their own, see "Rows with equal inputs" (C.2) in docs/algorithms/selection.md.
 struct EqualRows {
   bool are_repeats = false;  ///< rows with equal inputs are repeats of one measurement
-  /// Of each row, what it must share a fold with. Empty: every row stands alone.
+  /// A number for each row; rows with the same number must share a fold. Empty: every row stands alone.
   std::vector<int> group;
-  /// Of each row, the position among `rows` of the row that it copies, itself if none. Empty: there are no copies.
+  /// For each row the position among `rows` of the row that it copies, or its own. Empty: there are no copies.
   std::vector<int> copy_of;
 };
 

@@ -68,7 +68,7 @@ std::vector<int> categorical_of(const TrainingData& data) {
   return categorical;
 }
 
-// Of each row, whether it is held out; empty: the fit deals folds.
+// True for each row that is held out; empty: the fit deals folds.
 std::vector<bool> held_out_of(const TrainingData& data) {
   const Eigen::Index rows = data.inputs.rows();
   std::vector<bool> held_out(data.held_out.empty() ? 0 : rows, false);

@@ -34,7 +34,8 @@ struct GivenRows {
   Eigen::VectorXd weights = {};     ///< not negative; a row of weight 0 takes no part. Empty: all 1
   std::vector<double> groups = {};  ///< rows of one group share a fold. Empty: each row stands alone
   std::vector<bool> held_out = {};  ///< of each row, whether it is of the only fold. Empty: the fit deals folds
-  /// Whether a row stands there as often as its weight says (docs/algorithms/data.md, "Row weights"). Set by checked().
+  /// True if weights are counts: a row of weight k is k equal rows (docs/algorithms/data.md, "Row weights"). Set by
+  /// checked().
   bool are_counts = false;
   std::vector<int> categorical = {};       ///< inputs whose values are categories 0, 1, 2, ...
   bool may_have_codes = true;              ///< as TrainingData

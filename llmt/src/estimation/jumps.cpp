@@ -14,7 +14,7 @@
 namespace llmt {
 namespace {
 
-// Of data with more rows than this a sample is used.
+// With more rows than this, jumps are measured on a sample.
 constexpr Eigen::Index most_rows_measured = 200000;
 
 // A band holds 20 % of the rows on the smaller side, at least 5 and at most 100 rows per coefficient of a local model.
@@ -138,7 +138,7 @@ BandRegression regression(const TrainingRows& training, const Partition& grown, 
 
 // Eq. (V.4), the mean over the outputs. `candidates`: thresholds among which growth chose.
 double root_mean_square_gap(BandRegression band, const std::vector<double>& least_scatter, double candidates) {
-  // What the continuous model leaves of the other columns, and of the residuals.
+  // Project the other columns and the residuals onto the complement of the continuous model.
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> first(band.continuous);
   for (Eigen::MatrixXd* columns : {&band.jump, &band.residuals}) {
     columns->applyOnTheLeft(first.householderQ().adjoint());
@@ -209,8 +209,8 @@ Sides sides_of(const TrainingRows& training, const Partition& grown, int index,
   return sides;
 }
 
-// What is missing in a row scatters its residual by more than the jump of many a split. So the rows without a missing
-// value are taken alone, if they are at least half of all.
+// A missing value scatters the residual of its row by more than many splits jump. So only the rows without a missing
+// value are taken if they are at least half of all.
 TrainingRows rows_to_measure_on(const TrainingRows& all) {
   if (!all.table->inputs.hasNaN()) return all;
   TrainingRows complete = all;

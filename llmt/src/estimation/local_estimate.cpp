@@ -25,7 +25,7 @@ Eigen::MatrixXd sparse_model(const LeafSums& sums, std::size_t node, const Eigen
   return model;
 }
 
-// Where there are so many coefficients for each row, wide_ridge() is faster.
+// From this number of coefficients for each row on, wide_ridge() is faster.
 constexpr Eigen::Index coefficients_per_row = 4;
 
 // A node's full model, under the signs of its slopes.

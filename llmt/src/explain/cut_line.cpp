@@ -14,10 +14,10 @@ namespace {
 // Transitions shorter than this part of the line count as jumps.
 constexpr double short_transition = 1e-9;
 
-// Where a logistic gate bends most: smaller pieces there save halvings.
+// A logistic gate bends most at these arguments. Cuts there save halvings.
 constexpr double bends_of_logistic[] = {-6.0, 0.0, 6.0};
 
-// What a split compares, along the line: base + position * slope.
+// The value that a split compares, as a function of the position on the line: base + position * slope.
 struct Comparison {
   double base = 0.0;
   double slope = 0.0;
@@ -41,7 +41,7 @@ class Cutter {
   Pieces run();
 
  private:
-  // What run() does last: orders cuts and crossings, each once.
+  // The last steps of run(): cuts and crossings are ordered, and equal ones merged.
   void sort_crossings();
   void sort_cuts();
 
@@ -122,7 +122,7 @@ void Cutter::sort_cuts() {
     cuts.push_back(crossing.position);
   }
   std::ranges::sort(cuts);
-  // Of positions that count as one, the middle and the end of the line are kept as they are.
+  // If positions count as one, the middle and the end of the line keep their exact values.
   for (double& position : cuts) {
     for (const double kept : {0.5, 1.0}) {
       const bool is_cut = kept == 1.0 || !line_.switched.empty();
@@ -137,7 +137,7 @@ void Cutter::cut_at(double position, double from, double to) {
   }
 }
 
-// Where on the line the product of two deviations has a value, both within the training extent.
+// The positions at which the product of two deviations has this value, both within the training extent.
 std::vector<double> Cutter::positions_of_product(const Regressor& regressor, double value) const {
   const Eigen::Index i = regressor.input;
   const Eigen::Index j = regressor.second_input;
@@ -154,7 +154,7 @@ std::vector<double> Cutter::positions_of_product(const Regressor& regressor, dou
   return {larger / square, constant / larger};
 }
 
-// Where factors of products leave the training extent, and where their holds end.
+// Cuts the line where factors of products leave the training extent, and where their holds end.
 void Cutter::cut_at_extent() {
   if (!at_kinks_ || std::none_of(model_.regressors().begin(), model_.regressors().end(), is_product)) {
     return;
@@ -168,7 +168,7 @@ void Cutter::cut_at_extent() {
   }
 }
 
-// Where a node's guard sets in or ends.
+// Cuts the line where a node's guard sets in or ends.
 void Cutter::cut_at_ranges(const Node& node, double from, double to) {
   for (Eigen::Index column = 0; at_kinks_ && column < std::ssize(model_.regressors()); ++column) {
     const Regressor& regressor = model_.regressors()[column];
@@ -268,7 +268,7 @@ void Cutter::visit_sides(const Node& node, const Comparison& along, double begin
   if (ends >= from - same_position) open_.push_back({first, from, std::max(from, std::min(to, ends))});
 }
 
-// Of an axis-orthogonal split; before and after are the same where the whole line is on one side.
+// The crossing of a split on one input; before and after are the same if the whole line is on one side.
 Crossing Cutter::crossing_of(const Node& node, const Comparison& along, double reach) const {
   const Eigen::Index j = node.split_input;
   const auto on_line = [&](double value) {
@@ -283,9 +283,9 @@ Crossing Cutter::crossing_of(const Node& node, const Comparison& along, double r
           .after = along.slope > 0.0 ? right : left};
 }
 
-// Of an oblique split: the input that moves what is compared most is put on the two sides; before and after are the
-// same where all from `from` to `to` is on one side. The parts are what the jump is shared out by, the limit of ever
-// steeper gates.
+// The crossing of an oblique split. The input that moves the compared value most is put on the two sides; before and
+// after are the same if all from `from` to `to` is on one side. The jump is shared out by the parts, which are the
+// limit for ever steeper gates.
 Crossing Cutter::oblique_crossing(int index, const Comparison& along, double from, double to,
                                   const Eigen::VectorXd& row) const {
   const Node& node = partition_.nodes[index];

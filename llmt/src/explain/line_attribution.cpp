@@ -24,7 +24,7 @@ constexpr double most_values_of_line = 2e8;
 constexpr double most_coarse_values = 1e6;
 constexpr double most_pieces_and_leaves = 2e7;
 
-// What is not a polynomial is taken for one of this degree, and so is everything where little precision is asked for.
+// A prediction that is no polynomial is taken for one of this degree; if little precision is asked for, every one is.
 constexpr int usual_degree = 8;
 
 // Equal pieces of a line that is not cut at kinks.
@@ -208,7 +208,7 @@ int Line::degree(const Eigen::VectorXd& row) const {
     open.pop_back();
     const Node& node = partition_.nodes[index];
     if (node.is_leaf()) {
-      // Where a guard sets in, and the holds of both factors.
+      // A guard sets in at two positions; products have the holds of both factors besides.
       largest = std::max(largest, of_validity + (has_products_ ? 8 : 2));
       continue;
     }
@@ -262,8 +262,8 @@ bool Line::estimate_rate(const Place& from, const Place& to, const Eigen::Vector
   return accepted;
 }
 
-// Where between two positions an output enters or leaves the range that it is clamped to, ascending. Exact where the
-// prediction is a polynomial; elsewhere near enough for halves of the piece to be cut better.
+// The positions, ascending, at which an output enters or leaves the range that it is clamped to. They are exact if the
+// prediction is a polynomial; else they are near enough for halves of the piece to be cut better.
 std::vector<double> Line::entries_of_range(const Place& from, double to) {
   if (!evaluator_.has_output_range() || line_.moving.empty()) return {};
   const double length = to - from.position;
@@ -320,7 +320,7 @@ void Line::integrate_one_side(const Place& from, const Place& to) {
   add_shares(length, change, rate);
 }
 
-// What the shares of a piece lack of the change is divided over the inputs in proportion to their rates.
+// The shares of a piece may not add up to the change. The rest is divided over the inputs in proportion to their rates.
 void Line::add_shares(double length, const Eigen::VectorXd& change, const Eigen::MatrixXd& rate) {
   Eigen::MatrixXd share = length * rate;
   const Eigen::VectorXd rest = change - share.rowwise().sum();

@@ -12,7 +12,7 @@ namespace {
 // In linear terms a missing value counts as z = 0.
 double in_terms(double z) { return std::isnan(z) ? 0.0 : z; }
 
-// Where a row goes at a split: both ways count as a way of its own.
+// The way of a row at a split. A row that goes both ways has a third one.
 enum class Way { left, right, both };
 
 Way way_of(const BoostedSplit& split, double z) {
@@ -60,7 +60,7 @@ int TwoRows::first_open(int feature) const {
   return is.second >= 0 && is_open(is.second) ? is.second : -1;
 }
 
-// Whether the split does not need to know from which row its input is taken.
+// True if both rows go the same way, so that it does not matter from which one the input is taken.
 bool TwoRows::is_same_way(const BoostedSplit& split) const {
   if (features_[split.feature].is.second >= 0) return false;
   const Way way = way_of(split, value(split.feature, true));

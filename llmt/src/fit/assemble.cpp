@@ -16,7 +16,7 @@
 namespace llmt {
 namespace {
 
-// Of the work of finishing: the chosen candidate in the folds, and as much of all rows.
+// Share of the work of finishing that the chosen candidate takes in the folds, and as much again on all rows.
 constexpr double share_of_folds = 0.4;
 
 // The first of all candidates, and all leaves.
@@ -51,7 +51,7 @@ std::vector<Partition> finish_folds(const Training& training, const std::vector<
   return partitions;
 }
 
-// What the leaves of a finished partition tell.
+// Numbers of leaves, coefficients and errors of a finished partition.
 PartitionSummary describe(const Partition& partition, const TrainingRows& rows, bool sparse) {
   PartitionSummary summary;
   summary.outputs = partition.outputs;

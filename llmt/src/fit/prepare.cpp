@@ -15,7 +15,7 @@
 namespace llmt {
 namespace {
 
-// Of the work of a fit with the robust loss.
+// Share of the work of a fit that the robust loss takes.
 constexpr double share_of_loss = 0.2;
 
 // Least squares cannot fit what the rounding of one output's error hides. Rows of weight 0 take no part.

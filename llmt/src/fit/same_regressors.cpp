@@ -21,7 +21,7 @@ Eigen::MatrixXd widened_columns(const Eigen::MatrixXd& slopes, const std::vector
   return result;
 }
 
-// Of [1, deviations].
+// The Gram matrix of [1, deviations] with zeros for the regressors that it lacks.
 Eigen::MatrixXd widened_gram(const Eigen::MatrixXd& gram, const std::vector<Eigen::Index>& positions,
                              Eigen::Index size) {
   if (gram.size() == 0) return gram;

@@ -14,7 +14,7 @@ namespace llmt {
 /// then quadratic ones. Linear alone without folds, and where quadratic local models cannot be made.
 std::vector<std::pair<LocalTerms, double>> terms_to_compare(const PreparedRows& rows);
 
-/// Of two fits the one whose error on held-out rows is smaller, with the errors of the other in
+/// The one of two fits whose error on held-out rows is smaller, with the errors of the other in
 /// FitSummary::other_terms. Where all linear models are least squares, quadratic ones have to be better beyond chance.
 /// A single fit is itself.
 FitResult better_of(std::vector<FitResult> fits);

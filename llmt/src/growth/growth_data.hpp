@@ -40,9 +40,9 @@ struct GrowthData {
     return training.table->inputs(training.rows[row], problem.options.split_inputs[split_input]);
   }
 
-  /// Where the two child models of a split meet, on average over the node's rows, if that is in the gap low ... high of
-  /// the split input; else the middle. `apart` and `slope`: value at the input's mean `mean` and slope of the
-  /// regression of their difference on the input, one per output. The result is at least low and below high.
+  /// The value of the split input at which the two child models meet, on average over the node's rows, if it lies in
+  /// the gap low ... high; else the middle of the gap. `apart` and `slope`: value at the input's mean `mean` and slope
+  /// of the regression of their difference on the input, one per output. The result is at least low and below high.
   double place_threshold(double low, double high, double mean, const Eigen::VectorXd& apart,
                          const Eigen::VectorXd& slope) const;
 

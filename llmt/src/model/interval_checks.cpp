@@ -7,7 +7,7 @@
 namespace llmt {
 namespace {
 
-// What fit() calls an input or an output until it is named.
+// True for the name that fit() gives to an input or an output that has none.
 bool is_unnamed(const std::string& name, const char* letter, Eigen::Index position, Eigen::Index count) {
   return name == fmt::format("{}{}", letter, position + 1) || (letter[0] == 'y' && count == 1 && name == "y");
 }

@@ -40,11 +40,11 @@ void check_model(const std::vector<InputColumn>& inputs, const std::vector<Outpu
 /// Throws ModelFault if two inputs, two outputs or two levels of an input have one name.
 void check_names(const std::vector<InputColumn>& inputs, const std::vector<OutputColumn>& outputs);
 
-/// What check_model() checks of a node by itself; its numbers have the right shapes afterwards.
+/// The part of check_model() that needs one node alone. Afterwards its numbers have the right shapes.
 void check_node(const Partition& partition, const ModelPart& part, const std::vector<InputColumn>& inputs,
                 Eigen::Index regressors);
 
-/// Where the values of a regressor lie in training, as deviations from its centre.
+/// The range of a regressor in training, as deviations from its centre.
 struct RegressorRange {
   double low = 0.0;
   double high = 0.0;

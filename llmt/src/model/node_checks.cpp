@@ -1,4 +1,4 @@
-// What is checked of a node by itself.
+// Checks of a model that need one node alone.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -60,7 +60,7 @@ void check_half_width(const Node& node, const Validity& validity, const std::vec
   }
 }
 
-// What every inverse of a sum of squares and products has: a quadratic form below 0 would give a leverage below 0.
+// True if the matrix may be the inverse of sums of squares and products. Others could give a leverage below 0.
 bool may_be_inverse_gram(const Eigen::MatrixXd& matrix) {
   constexpr double rounding = 1.0 + 1e-6;
   if (!(matrix(0, 0) > 0.0) || !(matrix.diagonal().array() >= 0.0).all()) return false;

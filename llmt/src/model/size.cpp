@@ -17,7 +17,7 @@ Eigen::Index size_of_regressor(const Regressor& regressor, const std::vector<Inp
                                                    : first + 1 + size_of_factor(inputs[regressor.second_input]);
 }
 
-// Of the local model of a node for one output of its partition.
+// The size of the local model of a node for one output of its partition.
 Eigen::Index size_of_local_model(const Node& node, Eigen::Index output, const std::vector<Eigen::Index>& regressors) {
   Eigen::Index size = 1;
   for (Eigen::Index k = 0; k < node.slope.cols(); ++k) {
@@ -30,7 +30,7 @@ bool is_on_number(const Node& node) {
   return node.level_side.empty() && node.threshold < std::numeric_limits<double>::max();
 }
 
-// What a split adds to the expressions of its children.
+// The size that a split adds to the expressions of its children.
 Eigen::Index size_of_split(const Node& node, const Validity& validity) {
   if (!node.level_side.empty()) return 3 + std::ranges::count(node.level_side, -1);
   if (!is_on_number(node)) return 3;
@@ -45,7 +45,7 @@ Eigen::Index size_of_split(const Node& node, const Validity& validity) {
   return 5 + 2 * transition;
 }
 
-// What weighing the local models by normalised Gaussians adds to them.
+// The size that weights by normalised Gaussians add to the local models.
 Eigen::Index size_of_gaussians(const Partition& partition) {
   std::vector<int> split;
   for (const Node& node : partition.nodes) {

@@ -17,7 +17,7 @@ std::string printable(std::string text, std::size_t most) {
   return text;
 }
 
-// What the parser says, without the name that its library gives to the mistake: "[json.exception.parse_error.101] ".
+// The message without the name that the library gives to the mistake: "[json.exception.parse_error.101] ".
 std::string without_number(const std::string& message) {
   const std::size_t end = message.starts_with('[') ? message.find("] ") : std::string::npos;
   return end == std::string::npos ? message : message.substr(end + 2);

@@ -10,9 +10,9 @@ namespace llmt {
 /// The format of model files, as their members "format" and "version" say.
 inline constexpr const char* model_format_name = "llmt-model";
 inline constexpr int model_format_version = 2;
-/// Of a file with an output_range, which programs that know version 2 alone would ignore.
+/// The version of a file with an output_range, which programs that know version 2 alone would ignore.
 inline constexpr int model_format_version_with_range = 3;
-/// Of a file with codes, which earlier programs would take for positions.
+/// The version of a file with codes, which earlier programs would take for positions.
 inline constexpr int model_format_version_with_codes = 4;
 
 /// The format of boosted models, which this is no version of.

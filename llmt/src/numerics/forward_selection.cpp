@@ -21,7 +21,7 @@ constexpr double rounding_of_squares = 1e-13;
 // The search ends when ten further regressors have not lowered AICc.
 constexpr int regressors_without_gain = 10;
 
-// What the chosen regressors leave of the correlations of all regressors and outputs.
+// The part of the correlations of regressors and outputs that the chosen regressors do not explain.
 struct Remaining {
   Eigen::MatrixXd factor;      // columns of the pivoted Cholesky factor of the regressors' correlations
   Eigen::VectorXd variance;    // of each regressor, 1 at the start; 0: constant or taken

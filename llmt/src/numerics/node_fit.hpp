@@ -23,7 +23,7 @@ struct NodeFit {
   Eigen::VectorXd low;            ///< smallest value of each column; its mean if there is none
   Eigen::VectorXd high;           ///< largest value
   Eigen::VectorXd centre_change;  ///< of the local models' value at `origin`, one per output
-  /// Of the local models' slopes, outputs x columns of X; of minimum norm in scaled columns.
+  /// Change of the local models' slopes, outputs x columns of X; of minimum norm in scaled columns.
   Eigen::MatrixXd slope_change;
   int rank = 1;  ///< of [1, X] over these rows, the constant included
 

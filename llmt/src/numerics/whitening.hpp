@@ -30,8 +30,8 @@ struct Whitening {
   Eigen::Index rank = 0;
 };
 
-/// Of a covariance matrix. Directions whose variance is at most `collinearity_tolerance` times the largest count as
-/// none.
+/// Whitens by a covariance matrix. A direction whose variance is at most `collinearity_tolerance` times the largest
+/// counts as none.
 Whitening whiten(const Eigen::MatrixXd& covariance);
 
 }  // namespace llmt

@@ -15,8 +15,8 @@ struct RowBlock {
   std::vector<bool> has_missing = {};        ///< one per input: whether some row lacks it
   bool has_infinite = false;                 ///< some value is infinite: not to be predicted
   Eigen::Index stride = 0;                   ///< from the deviations of a row to those of the next
-  /// Of the regressors from their centres, one row after the other, padded with zeros to whole quads; NaN where an
-  /// input is missing or its level unknown.
+  /// Deviations of the regressors from their centres, one row after the other, padded with zeros to whole quads; NaN if
+  /// an input is missing or its level unknown.
   std::vector<double> deviations = {};
 
   Eigen::Index rows() const { return inputs.rows(); }

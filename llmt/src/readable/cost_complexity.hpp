@@ -16,7 +16,7 @@ struct PricedNode {
   std::vector<Eigen::Index> sizes = {};  ///< of these equations
 };
 
-/// Of a node that is no leaf.
+/// Stands in the place of an equation for a node that is no leaf.
 inline constexpr int stays_split = -1;
 
 /// The tree that minimises (A.1), sum of errors + price x size. For every node the equation that it has as a leaf, or

@@ -23,8 +23,8 @@ int exponent_below(double value) {
 }
 
 double rounded(double value, int exponent) {
-  // Of a negative exponent the power itself is no double, but its inverse is, and a quotient of two whole numbers is
-  // rounded once.
+  // A negative power of ten is no double, but its inverse is. So the result is a quotient of two whole numbers, which
+  // is rounded once.
   const double unit = std::pow(10.0, std::abs(exponent));
   const double multiple = exponent < 0 ? std::round(value * unit) : std::round(value / unit);
   const double result = exponent < 0 ? multiple / unit : multiple * unit;

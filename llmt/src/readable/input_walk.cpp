@@ -22,7 +22,7 @@ constexpr Eigen::Index growth_rows = 10000;
 // Inputs of the local models with which splits are searched: the time grows with the square of their number.
 constexpr Eigen::Index most_growth_inputs = 13;
 
-// Of the work that is left in a walk, for the trees of one form. Later ones have fewer inputs.
+// Share of the work that is left in a walk for the trees of one form. Later forms have fewer inputs.
 constexpr double share_of_tree = 0.15;
 
 // Rows in a leaf, where the caller says nothing.

@@ -22,7 +22,7 @@ struct Grains {
   std::vector<std::vector<int>> slopes;  ///< of each output, one exponent a term
 };
 
-/// Where the columns of sums are 0.
+/// The values of terms and outputs at which the columns of sums are 0.
 struct Origin {
   Eigen::VectorXd terms;
   Eigen::VectorXd outputs;

@@ -135,7 +135,7 @@ struct ChosenTree {
   std::vector<int> pruned;
 };
 
-// What is made of one partition: the chosen trees of the folds and, last, of all rows.
+// The readable trees of one partition: those of the folds and, last, that of all rows.
 struct ReadableTrees {
   std::vector<Sample> samples;
   std::vector<std::optional<ChosenTree>> trees;

@@ -21,7 +21,7 @@ struct RowValues {
   Eigen::Index count() const { return weights.size(); }
 };
 
-/// What trees are grown from and judged on.
+/// The rows that trees are grown from, and those that they are judged on.
 struct Sample {
   /// Training rows. Centres of numbers are rounded means, so that products of deviations can be printed; regressors are
   /// numbers and levels.
@@ -32,7 +32,7 @@ struct Sample {
   RowValues training;
   RowValues held_out;  ///< none for all rows
 
-  /// Of the training rows.
+  /// Sum of the weights of the training rows.
   double total_weight() const {
     return sum_of_rows(training.count(), [&](Eigen::Index i) { return training.weights(i); });
   }
@@ -51,7 +51,7 @@ struct Term {
 /// The terms of the given inputs: their regressors and, with `products`, products and squares of numbers.
 std::vector<Term> terms_of(const Sample& sample, const std::vector<int>& inputs, bool products);
 
-/// What a term adds to the size of an expression, coefficient and operators included (expression_size()).
+/// The size that a term adds to an expression, coefficient and operators included (expression_size()).
 Eigen::Index size_of_term(const Sample& sample, const Term& term);
 
 }  // namespace llmt

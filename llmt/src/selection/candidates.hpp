@@ -11,7 +11,7 @@
 
 namespace llmt {
 
-/// What the candidates are.
+/// The kinds of models that held-out rows decide among.
 struct Candidates {
   bool crisp = true;
   ValidityKind kind = ValidityKind::blend;  ///< of the others

@@ -38,7 +38,7 @@ std::vector<Variant> variants_of(const Candidates& candidates) {
   return variants;
 }
 
-// Of one fold.
+// Errors of the crisp trees of one fold on its held-out rows.
 struct CrispErrors {
   std::vector<Eigen::VectorXd> of_trees;  // of each variant: squared errors of the trees with 1, 2, ... leaves
   std::vector<double> of_ridges;          // of one leaf, for each of the linear shrinkages

@@ -40,7 +40,7 @@ std::vector<Eigen::Index> compared_leaf_counts(Eigen::Index largest) {
   return counts;
 }
 
-// Of what is left of a comparison, about the part that an evaluation takes.
+// About the share of the work left in a comparison that an evaluation takes.
 constexpr double share_of_evaluation = 0.4;
 
 }  // namespace

@@ -155,7 +155,7 @@ class Screening {
     return race;
   }
 
-  // Of the forms in the race, without those that are at their end, or clearly worse than the best.
+  // The better half of the forms in the race that are neither at their end nor clearly worse than the best.
   Race better_half(const Race& racing, std::size_t next) const {
     Ranked best = first_of_each(ranked(comparison_, screening_), form_of);
     std::erase_if(best, [&](const auto& entry) { return !racing.contains(entry.second.form); });
@@ -244,8 +244,8 @@ class Screening {
     return best;
   }
 
-  // Of each finalist the best few, and the best of each leaf count near its best; on half of the other folds, then
-  // those that are not clearly worse on all.
+  // For each finalist the best few candidates, and the best of each leaf count near its best, are compared on half of
+  // the other folds. Those that are not clearly worse are then compared on all.
   std::set<Key> compare_on_all_folds() {
     std::set<Key> kept;
     for (const auto& [least, best] : finalists_of()) {
@@ -273,7 +273,8 @@ class Screening {
     return !tries_all_pairs(key) && comparison_.is_clearly_worse(key, best, folds);
   }
 
-  // Where one with jumps stays, the best of its width without jumps does too: jumps must gain on it beyond chance.
+  // If a candidate with jumps stays, the best of its width without jumps stays too: jumps must gain on it beyond
+  // chance.
   std::set<Key> without_clearly_worse(const std::set<Key>& keys, std::size_t folds) const {
     Ranked order = ranked(comparison_, folds);
     std::erase_if(order, [&](const auto& entry) { return !keys.contains(entry.second); });

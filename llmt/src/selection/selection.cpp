@@ -15,10 +15,10 @@
 namespace llmt {
 namespace {
 
-// What is less simple has to be better by more than this many standard errors of the gain.
+// A model that is less simple has to be better by more than this many standard errors of the gain.
 constexpr double standard_errors_of_a_gain = 2.0;
 
-// Of the work of a comparison.
+// Share of the work of a comparison that crisp trees take.
 constexpr double share_of_crisp = 0.1;
 
 // The best of each width: with jumps only if their gain on none is beyond chance.

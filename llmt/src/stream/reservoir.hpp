@@ -11,9 +11,8 @@
 
 namespace llmt {
 
-/// Of all different rows so far, those with the smallest hashes of their values: a sample without replacement that does
-/// not depend on the order of the rows, and in which a row that comes again is recognised. One row in eight is held
-/// out.
+/// The different rows so far whose values have the smallest hashes: a sample without replacement that does not depend
+/// on the order of the rows, and in which a row that comes again is recognised. One row in eight is held out.
 class Reservoir {
  public:
   /// Rows of `width` numbers.

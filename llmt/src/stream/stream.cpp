@@ -95,7 +95,7 @@ void check_rows(const StreamState& state, const Eigen::Ref<const Eigen::MatrixXd
 
 std::unique_ptr<StreamState> make_state(Eigen::Index inputs, Eigen::Index outputs, const StreamOptions& options) {
   check(inputs, outputs, options);
-  // What a snapshot needs at least: the sums of one leaf.
+  // A snapshot needs the sums of one leaf at least.
   refuse_beyond_memory(
       {.rows = 0, .inputs = inputs, .outputs = outputs, .coefficients = inputs + 1, .unknowns = 0, .threads = 1},
       machine_memory());

@@ -9,9 +9,9 @@
 
 namespace llmt {
 
-/// What the features of rows are relative to: they are [1, z - origin, y - base . [1, z - origin]], z the scaled
-/// regressors. `base` is a model near the truth, so that sums of squares of the residual keep their digits
-/// (docs/algorithms/stream.md).
+/// The point and the model that the features of rows are relative to. Features are
+/// [1, z - origin, y - base . [1, z - origin]], z the scaled regressors. `base` is a model near the truth, so that sums
+/// of squares of the residual keep their digits (docs/algorithms/stream.md).
 struct Basis {
   Eigen::VectorXd origin;
   Eigen::VectorXd base;  ///< constant and slopes

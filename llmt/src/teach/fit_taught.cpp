@@ -52,7 +52,7 @@ double error_of_teachers(const Training& training, const std::vector<Eigen::Matr
   return FoldErrors(folds, std::ssize(served))({}, sums).rmse;
 }
 
-// Of both trees, by the errors of the one that is fitted to the data.
+// True if the taught trees have the smaller error; each counts in units of the error of the tree fitted to the data.
 bool is_better(const FitSummary& taught, const FitSummary& alone) {
   std::vector<CandidateError> of_taught;
   std::vector<CandidateError> of_alone;

@@ -19,7 +19,7 @@ constexpr Eigen::Index most_near_rows = 4000;
 // values in the mean, in standard deviations.
 constexpr double squared_difference = 2.0;
 
-// So many places, evenly spaced among `all`.
+// `count` places, evenly spaced among `all`.
 std::vector<int> places(Eigen::Index count, Eigen::Index all) {
   std::vector<int> result(count);
   for (Eigen::Index k = 0; k < count; ++k) result[k] = static_cast<int>(k * all / count);

@@ -8,7 +8,7 @@
 namespace llmt::robotics {
 namespace {
 
-// Of normal errors one in 500 million lies beyond; of those that a wrong description makes, hardly any.
+// One in 500 million normal errors lies beyond, and hardly any error of a wrong description.
 constexpr double most_scales = 6.0;
 // Rounding, in mm, degrees and multiples of sigma: readings without noise contradict each other by as much.
 constexpr double least_scale = 1e-6;

@@ -132,7 +132,7 @@ Poses around(const PoseRegion& region, const Eigen::MatrixXd& chosen, double ste
 
 constexpr double steps_deg[] = {40.0, 20.0, 10.0, 5.0, 2.5, 1.25};
 
-// Of the time of a selection.
+// Shares of the time of a selection.
 constexpr double share_of_choice = 0.2;
 constexpr double share_of_a_step = 0.1;
 

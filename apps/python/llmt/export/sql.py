@@ -20,7 +20,7 @@ _MOST_SPLITS = 1500  # every split is a column of an intermediate table; Postgre
 
 
 def _are_rules(partition: Partition) -> bool:
-    """Whether every row lies in one leaf, whose equation holds as it is: so are the trees of fit_readable()."""
+    """True if every row lies in one leaf, whose equation holds as it is, as in the trees of fit_readable()."""
     root = partition.nodes[0]
     return not partition.residual_range and all(
         node.low == root.low

@@ -153,7 +153,7 @@ struct Missing {
   Eigen::MatrixXd corrected;           ///< n x d: with the terms found
   std::vector<Eigen::Index> searched;  ///< rows
   std::vector<Eigen::Index> held_out;  ///< rows
-  /// Of each row in `held_out`: the number of the sample that it is in; equal for rows that were averaged.
+  /// For each row in `held_out` the number of its sample; equal for rows that were averaged.
   std::vector<Eigen::Index> held_out_samples;
   std::vector<Eigen::Index> outliers;  ///< rows that fit nothing and were left out of the fit
   std::vector<UntestableCause> not_testable;

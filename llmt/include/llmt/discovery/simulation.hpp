@@ -43,7 +43,7 @@ Simulation linearised(Simulation simulation, const Eigen::MatrixXd& simulated, s
 ///    the same. Of several outputs, each is weighted by the inverse of the scatter that is left of it.
 /// 6. The errors on the rows set aside are computed, once. A term that does not shrink them is not confirmed. If all
 ///    terms together make them larger, the terms that do it are refuted, and the steps are repeated without them and
-///    with other rows set aside; after the third failure the answer is failed_held_out.
+///    with other rows set aside. If the third search fails too, in time the fourth, the answer is failed_held_out.
 ///
 /// Terms that depend on earlier rows (ModelTerm::history) are tried after the others have been found, and stay where
 /// they explain better by SearchOptions::rival_margin.

@@ -45,7 +45,7 @@ struct EffectCandidate {
   bool generic = false;  ///< not a cause but a shape: what it explains is "unknown, looks like this"
   /// Added to the score; 2 ln m for one that was picked as the best of m by looking at the residuals.
   double prior_cost = 0.0;
-  /// Of explanations that predict the same at every sample, the one with the less complex candidate gets the name.
+  /// If explanations predict the same at every sample, the one with the less complex candidate gets the name.
   int complexity = 0;
   /// k, or empty: what signature' residuals lacks because errors of the inputs are in both.
   Eigen::VectorXd moment_correction = {};
@@ -61,7 +61,7 @@ struct SearchOptions {
   double false_alarm_rate = 0.003;  ///< of the whole search when nothing is missing
   int null_draws = 300;             ///< of each kind, see search()
   double rival_margin = 6.0;        ///< score difference within which an alternative explains as well
-  /// Of rivals at the same place the least complex gets the name, though they are not the same at every sample.
+  /// The least complex of the rivals at a place gets the name, though they are not the same at every sample.
   bool simplest_of_rivals = false;
   /// A family is also a rival if the set with it in the place of a finding explains at least 1 - model_error of the
   /// explained sum of squares: masses and lengths are not known to better than that.

@@ -25,23 +25,24 @@ class Alternatives {
         options_(&options),
         refuted_(&refuted) {}
 
-  /// A state and terms of the row itself explain a part of each other. Where a term of a state was refuted beside
-  /// others, but such terms alone hold and leave less than what was found without them, they are the answer.
+  /// Replaces all terms by terms of states alone if a term of a state was refuted beside others, but such terms alone
+  /// hold and leave less. States and terms of the row itself explain a part of each other.
   Missing state_for_terms(Missing found) const;
 
-  /// What a measured input shows, as a second encoder shows a spring, a state explains too, without the errors of that
-  /// input. Where plain terms alone, no more of them, leave next to nothing and little more than a state does, they are
-  /// the answer.
+  /// Replaces terms of states by no more plain terms if these leave next to nothing and little more than the states do.
+  /// A state also explains what a measured input shows, as a second encoder shows a spring, and has no error of its
+  /// own.
   Missing terms_for_state(Missing found) const;
 
-  /// Shapes follow noise that is alike in neighbours farther than causes do, and they follow what is small beside the
-  /// causes. Where causes alone leave as little, they are the answer.
+  /// Replaces shapes by causes if these leave as little. Shapes follow noise that is alike in neighbours farther than
+  /// causes do, and they follow what is small beside the causes.
   Missing causes_for_shapes(Missing found) const;
 
-  /// What a term with a constant misses makes neighbours alike, so that few samples count and two plain terms in its
-  /// place do not seem to be worth their cost. Terms without constants are the answer where they leave clearly less, or
-  /// no more with fewer fitted numbers, or, all of them certain and with no more numbers, as much by the margin of a
-  /// rival. Where uncertain ones do as well by that margin, the term is tentative: it may be an approximation too.
+  /// Replaces a term that has a searched constant by plain terms if these leave less than 80 % of the squares, or no
+  /// more with fewer fitted numbers, or, all certain and with no more numbers, as much by the margin of a rival. If
+  /// uncertain ones do as well by that margin, the term becomes tentative, as it may be an approximation too. The
+  /// errors of such a term make neighbours alike, so that few samples count and two plain terms do not seem to be worth
+  /// their cost.
   Missing plain_for_searched(Missing found) const;
 
  private:

@@ -121,7 +121,7 @@ struct SumsOfLeaf {
   static auto fields(auto& self) { return std::tie(self.gram, self.products, self.squares, self.range, self.blocks); }
 };
 
-// Of the leaves that reach one of the rows.
+// The sums of every leaf that reaches one of the rows.
 using SumsOfLeaves = std::map<int, SumsOfLeaf>;
 
 // One pass over the rows that forms the sums.

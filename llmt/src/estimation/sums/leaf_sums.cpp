@@ -24,7 +24,7 @@ constexpr double least_diagonal = 1e-12;
 // The coefficients that forward selection takes from the sums of a node.
 std::vector<Eigen::Index> select(const LeafSums& sums, std::size_t node) {
   const TrainingRows& training = *sums.training;
-  // Where a sample stands for all rows by its weights, AICc counts the rows of the sample.
+  // AICc counts rows. If a sample stands for all rows by its weights, it counts those of the sample.
   const double rows_per_weight = static_cast<double>(training.count()) / total_weight(training);
   // Sums of the outputs, from those of the residuals of the root's model.
   const NormalEquations& equations = sums.equations;

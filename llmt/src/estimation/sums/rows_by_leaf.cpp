@@ -9,7 +9,7 @@
 namespace llmt {
 namespace {
 
-// Of every leaf, its place from left to right in the tree.
+// The place of every leaf, from left to right in the tree.
 std::vector<int> places_of(const Partition& partition) {
   std::vector<int> place(partition.nodes.size(), 0);
   int next = 0;

@@ -36,7 +36,7 @@ constexpr Eigen::Index most_compared_rows = 2000;
 constexpr Eigen::Index least_compared_rows = 500;
 constexpr Eigen::Index most_compared_numbers = 25000;
 
-// Of the work that is left, for the comparison of a form.
+// Share of the work that is left for the comparison of a form.
 constexpr double share_of_choice = 0.05;
 
 bool may_have_codes(const FitOptions& options) {

@@ -24,7 +24,7 @@ constexpr double largest_ratio = 1.2;
 // With more rows for each input than this, coefficients of useless inputs cost too little to look for them.
 constexpr Eigen::Index most_rows_per_input = 300;
 
-// Of the work that is left, for a number of inputs.
+// Share of the work that is left for each number of inputs.
 constexpr double share_of_step = 0.1;
 
 // Rows that importance looks at.

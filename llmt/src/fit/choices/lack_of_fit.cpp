@@ -47,7 +47,7 @@ double LackOfFit::p_value(const Eigen::Ref<const Eigen::VectorXd>& input, const 
     column.stableNormalize();
   }
   indicators -= basis_ * (basis_.transpose() * indicators);
-  // What rounding leaves of columns that say nothing new is not to be taken for something.
+  // Columns that say nothing new are left with rounding errors, which must not count.
   for (auto column : indicators.colwise()) {
     if (column.norm() < 1e-6) column.setZero();
   }

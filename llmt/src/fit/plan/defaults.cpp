@@ -11,7 +11,7 @@
 namespace llmt {
 namespace {
 
-// What a default depends on. A row of a table below holds if its case does; the first such row counts.
+// The facts that a default depends on. In the tables below the first row counts whose case holds.
 struct Case {
   bool folds = false;        // something is chosen on held-out rows
   bool one_fold = false;     // many rows, held out once: the widest transitions and some ridges would take most time
@@ -116,7 +116,7 @@ constexpr Eigen::Index most_overlapping_leaves = 400;
 // Leaves on the two sides of splits on monotone inputs are compared in pairs.
 constexpr Eigen::Index most_ordered_leaves = 30;
 
-// Of a crisp tree that is grown without a test, to be pruned: of many rows it would have leaves without number.
+// A crisp tree that is grown without a test, to be pruned, has at most this many leaves; many rows would make it huge.
 constexpr Eigen::Index most_pruned_leaves = 1000;
 
 // Rows in a leaf that overlaps others: a joint estimate has those of its neighbours too.

@@ -158,7 +158,7 @@ void BestFirstTree::enter(OpenLeaf leaf) {
   leaves_.emplace_back(std::move(leaf));
 }
 
-// Of equally frequent reasons the first one in StopReason.
+// If several reasons are equally frequent, the first one in StopReason.
 StopReason BestFirstTree::most_frequent_refusal() const {
   const auto fewer = [](const auto& a, const auto& b) { return a.second < b.second; };
   return std::ranges::max_element(refusals_, fewer)->first;

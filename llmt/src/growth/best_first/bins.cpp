@@ -11,7 +11,7 @@
 namespace llmt {
 namespace {
 
-// So many rows decide where the edges lie. These are 250 rows per bin, which give a bin's share of the rows to 6 %.
+// The edges are quantiles of a sample of this size: 250 rows a bin, which give a bin's share of the rows to 6 %.
 constexpr Eigen::Index sample_rows = 65536;
 
 // At most bins - 1 edges, each between two neighbouring values of the sample.

@@ -13,7 +13,7 @@ struct ExactLeaf {
   RowMajor inputs;                       ///< of the rows, all columns; NaN: missing
   Eigen::VectorXd weights;               ///< of the rows in this leaf
   std::vector<std::vector<int>> orders;  ///< rows by each numeric split input that has a value, ascending; RA: empty
-  /// Of a local model, rows x outputs: of the parent's model until the leaf is examined, then of its own.
+  /// Rows x outputs. They are those of the parent's model until the leaf is examined, then those of its own.
   Eigen::MatrixXd residuals;
 
   double split_value(const GrowthData& data, Eigen::Index row, Eigen::Index split_input) const {

@@ -21,7 +21,7 @@ struct InputHistogram {
   static auto fields(auto& self) { return std::tie(self.grams, self.counts); }
 };
 
-/// Those of all split inputs, or of some of them.
+/// The histograms of all split inputs, or of some of them.
 using Histogram = std::vector<InputHistogram>;
 
 /// Takes the rows of `less` out of `histogram`.

@@ -76,7 +76,7 @@ BinnedRows::Edges BinnedRows::search_edges(const Histogram& histogram, const std
   return edges;
 }
 
-// Whether the two rows next to an edge decide a direction of the model of their side (docs/algorithms/growth.md). They
+// True if the two rows next to an edge decide a direction of the model of their side (docs/algorithms/growth.md). They
 // can only if the bin that holds them does.
 bool BinnedRows::rests_on_two_rows(const Edges& edges, std::size_t at, std::size_t input,
                                    const std::vector<int>& node_rows) const {

@@ -85,7 +85,7 @@ std::span<const double> values_of(const ResidualNode& node, Eigen::Index split_i
   return std::span(node.values.col(split_input).data(), node.rows.size());
 }
 
-// Where each numeric input would be split for each output, if the test of its classes says anything.
+// The cut of each numeric input for each output, if the test of its classes says anything.
 std::vector<ResidualCut> candidates_of(const GrowthData& data, const ResidualNode& node) {
   const Eigen::Index outputs = node.residuals.cols();
   std::vector<ResidualStatistics> statistics(data.split_inputs() * outputs);

@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t orders_of_levels = 3;
 constexpr std::size_t most_level_cuts = 32;
 
-// Of a leaf's rows: their level, -1 where there is none, and the weight of every level.
+// The level of each of a leaf's rows, -1 if it has none, and the weight of every level.
 struct Levels {
   std::vector<int> of_row;
   Eigen::VectorXd weight;

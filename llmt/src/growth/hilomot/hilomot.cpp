@@ -85,7 +85,7 @@ class HilomotTree {
 
   void open_root();
 
-  // What split_worst_first() asks for.
+  // split_worst_first() calls these.
   Eigen::Index num_leaves() const { return std::ssize(leaves_); }
   bool is_exact() const;
   double aicc() const;

@@ -80,7 +80,7 @@ class LolimotTree {
 
   void open_root();
 
-  // What split_worst_first() asks for.
+  // split_worst_first() calls these.
   Eigen::Index num_leaves() const { return std::ssize(models_); }
   bool is_exact() const { return loss() <= least_loss_; }
   double aicc() const;

@@ -12,7 +12,7 @@ namespace llmt {
 /// fewer coefficients.
 class AdjustedRss {
  public:
-  /// Of the node: sum of the rows' weights, rank, and RSS of its own model.
+  /// `weight`, `rank` and `rss`: sum of the weights of the node's rows, rank and RSS of its own model.
   AdjustedRss(double weight, int rank, double rss) : weight_(weight), rank_(rank), rss_(rss) {}
 
   double of_node() const { return rss_; }  ///< RSS of the node's own model

@@ -24,8 +24,8 @@ constexpr Eigen::Index most_parts = 33;
 // Up to this many rows all splits of a block are compared.
 constexpr Eigen::Index few_rows = 16;
 
-// Where Gram matrices are large there are fewer blocks and parts, so that their sums take at most this many doubles
-// (64 MiB), but never fewer than the other number.
+// The sums of all blocks and parts take at most this many doubles (64 MiB). If Gram matrices are large there are fewer
+// blocks and parts, but never fewer than the second number.
 constexpr Eigen::Index most_sums = Eigen::Index{1} << 23;
 constexpr Eigen::Index fewest_pieces = 4;
 

@@ -42,7 +42,7 @@ struct FoundEffect {
   std::vector<std::vector<Effect>> rival_effects;  ///< the rivals as effects that could stand in the robot
   bool exact_alias = false;  ///< a rival predicts the same at every pose: no measurement can distinguish them
   double share = 0.0;        ///< of the explained sum of squares
-  /// Of the displacement that it causes beyond what geometry and the other effects can imitate. It is never larger than
+  /// Root mean square of the displacement that geometry and the other effects cannot imitate. It is never larger than
   /// the root mean square of what the calibrated robot misses.
   double rms_mm = 0.0;
   double family_rms_mm = 0.0;  ///< the same of all places of its family together
