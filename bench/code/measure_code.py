@@ -26,7 +26,8 @@ def circle_places(checkout):
     found = circles.strongly_connected(circles.cpp_modules(checkout))
     places = [checkout.root / (circle[0] + ".cpp") for circle in found]
     for circle in circles.strongly_connected(circles.python_modules(checkout)):
-        places.append(checkout.root / "apps/python" / (circle[0].replace(".", "/") + ".py"))
+        path = checkout.root / "apps/python" / circle[0].replace(".", "/")
+        places.append(path / "__init__.py" if path.is_dir() else path.with_suffix(".py"))
     return [(place, 1) for place in places]
 
 
@@ -125,4 +126,7 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except BrokenPipeError:  # `| head`
+        sys.exit(0)

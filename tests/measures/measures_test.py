@@ -112,6 +112,13 @@ class Measures(unittest.TestCase):
         self.add("apps/python/llmt/_two.py", "def b():\n    from ._one import c\n    return c\n")
         self.refused("apps/python/llmt: circles rose from 0 to 1")
 
+    def test_a_compiled_module_is_in_no_circle(self):
+        self.write("apps/python/llmt/__init__.py", "from ._one import b as b\n")
+        self.add("apps/python/llmt/_two.py", "from llmt import _core\n")
+        self.accepted()
+        self.add("apps/python/llmt/_two.py", "from llmt import b\n")
+        self.refused("apps/python/llmt: circles rose from 0 to 1")
+
     def test_a_fall_asks_for_the_lower_figure(self):
         self.write("llmt/src/a/judge.cpp", "void judge() { found.answer = no; }\n")
         self.refused("llmt/src/a: thresholds fell from 1 to 0. Lower the figure")

@@ -114,7 +114,7 @@ def python_modules(checkout, package="apps/python/llmt"):
                     inner = start + (alias.name,)
                     if inner in modules:
                         reached.add(inner)
-                    elif start in modules and (node.module or has(start, alias.name)):
+                    elif start in modules and (modules[start].stem != "__init__" or has(start, alias.name)):
                         reached.add(start)
         edges[".".join(parts)] = {".".join(name) for name in reached if name in modules and name != parts}
     return edges
