@@ -34,7 +34,12 @@ class Option(collections.namedtuple("Option", "names value text default")):
         words = re.split("[|,]", choice.group(1)) if choice else []
         value = "" if words else self.value if self.value.startswith("[") else f" {self.value}".rstrip()
         names = ", ".join(f"`{name}`" for name in self.names[:-1] + (self.names[-1] + value,))
-        text = self.text + (f" ({', '.join(f'`{word}`' for word in words)})" if words else "")
+        text = self.text
+        marked = [rf"(?<![\w-]){word}(?![\w-])" for word in words]
+        if all(re.search(word, text) for word in marked):
+            text = re.sub("|".join(marked), r"`\g<0>`", text) if marked else text
+        else:
+            text += f" ({', '.join(f'`{word}`' for word in words)})"
         default = self.default.replace("; ", "<br>") if len(self.default) > WIDE else self.default
         return f"| {names} | {in_cell(text)} | {in_cell(default)} |".replace("|  |", "| |")
 
