@@ -6,6 +6,7 @@ import re
 from .sources import line_of
 
 _HEADER = "llmt/include/llmt/options.hpp"
+_VISITOR = "llmt/include/llmt/option_fields.hpp"  # of the members of the structs; one list with them
 _ESTIMATOR = "apps/python/llmt/_estimator.py"
 _TEXT = re.compile(r'//[^\n]*|"((?:\\.|[^"\\\n])*)"')
 _COPY = re.compile(r"(?:\.|->)(\w+)\s*=\s*(?:static_cast<[\w:]+>\()?[\w.]*(?:\.|->)(\w+)\b")
@@ -66,7 +67,8 @@ def _parameters(checkout):
 
 def lists(checkout):
     """Files that name more than half of the options of a fit by hand, the header of the options itself among them, and
-    displays of Python (a dict, list, tuple or set) that name three parameters of the estimator or more.
+    displays of Python (a dict, list, tuple or set) that name three parameters of the estimator or more. What visits the
+    members of the structs is one list with them.
 
     A struct that repeats the options and the functions of its room that copy from and to it are one list."""
     fields = _fields(checkout)
@@ -74,6 +76,8 @@ def lists(checkout):
     for path in checkout.cpp():
         if checkout.name(path) == _HEADER:
             places.append((path, 1))
+            continue
+        if checkout.name(path) == _VISITOR:
             continue
         named = _named(checkout, path, fields)
         if 2 * len(named) > len(fields):
