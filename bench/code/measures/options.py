@@ -67,8 +67,8 @@ def _parameters(checkout):
 
 def lists(checkout):
     """Files that name more than half of the options of a fit by hand, the header of the options itself among them, and
-    displays of Python (a dict, list, tuple or set) that name three parameters of the estimator or more. What visits the
-    members of the structs is one list with them.
+    files of Python with a display (a dict, list, tuple or set) that names three parameters of the estimator or more. The
+    visitor of the members is one list with the structs.
 
     A struct that repeats the options and the functions of its room that copy from and to it are one list."""
     fields = _fields(checkout)
@@ -90,10 +90,12 @@ def lists(checkout):
             places.append((path, min(named.values())))
     known = fields | _parameters(checkout)
     for path in checkout.python():
+        lines = []
         for node in ast.walk(checkout.tree(path)):
             if isinstance(node, (ast.Dict, ast.List, ast.Tuple, ast.Set)):
                 keys = node.keys if isinstance(node, ast.Dict) else node.elts
                 named = {key.value for key in keys if isinstance(key, ast.Constant)} & known
                 if len(named) >= _FEWEST_OF_PYTHON:
-                    places.append((path, node.lineno))
+                    lines.append(node.lineno)
+        places += [(path, min(lines))] if lines else []
     return places
