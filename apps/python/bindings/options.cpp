@@ -52,9 +52,22 @@ Options options_from(const nb::dict& given) {
   return options;
 }
 
-// What a way of fitting does with an option: "taken", "without effect" or "refused".
-const char* word_of(const Use& use) {
-  return use.is_taken() ? "taken" : use.is_refused() ? "refused" : "without effect";
+// How the estimator reads a parameter.
+template <class Value>
+const char* kind_of(const Value&) {
+  if constexpr (std::is_same_v<Value, bool>) return "switch";
+  if constexpr (std::is_integral_v<Value>) return "count";
+  if constexpr (std::is_enum_v<Value>) return "choice";
+  return "other";
+}
+
+template <class Value>
+nb::list names_of_choices(const Value&) {
+  nb::list names;
+  if constexpr (std::is_enum_v<Value>) {
+    for (const Choice<Value>& choice : choices<Value>()) names.append(std::string(choice.name));
+  }
+  return names;
 }
 
 }  // namespace
@@ -73,14 +86,15 @@ std::string parameter_of(std::string_view option) {
 void add_options(nb::module_& module) {
   module.def("fit_fields", [] {
     nb::list fields;
-    for (const OptionField& field : option_fields()) {
+    const FitOptions options;
+    for_each_field(options, [&](const OptionField& field, const auto& value) {
       nb::dict entry;
       entry["name"] = std::string(field.name);
       entry["parameter"] = std::string(field.parameter);
-      entry["beyond_memory"] = word_of(field.beyond_memory);
-      entry["in_stream"] = word_of(field.in_stream);
+      entry["kind"] = kind_of(value);
+      entry["choices"] = names_of_choices(value);
       fields.append(entry);
-    }
+    });
     return fields;
   });
 }

@@ -14,22 +14,6 @@ from ._regressor import FitRows, TableRegressor, check_rows, count, names_of, sp
 from ._tree_views import TreeViews
 from .tables import Table, read_table, read_targets
 
-# Parameters that are no options of a fit (option_fields.hpp) and that fit() alone takes: what to do beyond one memory.
-_of_fit_alone = {
-    "categorical_features": "name their categories by levels",
-    "readable": "fit a sample that fits into memory",
-    "teach": "fit a sample that fits into memory",
-}
-
-_choices = {
-    "rule": ("rd", "retis", "ra", "m5", "lolimot", "lolimot-data", "hilomot"),
-    "validity": ("auto", "crisp", "blend", "gaussian"),
-    "local_models": ("linear", "quadratic", "auto"),
-    "sparse": ("never", "auto", "always"),
-    "loss": ("squared", "tukey"),
-}
-
-
 class LocalLinearTreeRegressor(TreeViews, TableRegressor):
     """A regression tree with a linear equation in every leaf, which may blend smoothly into its neighbours.
 
@@ -213,9 +197,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
             self._inputs = names_of(table)
             self._outputs = names or target_names(self.n_outputs_)
             self._levels = table.levels
-            for name in _of_fit_alone:
-                if getattr(self, name):
-                    raise ValueError(f"{name} is not for streams")
+            self._refuse_others("is not for streams")
             stream = self._stream = StreamModel(self.n_features_in_, self.n_outputs_, self._options())
         outputs = outputs.reshape(len(outputs), -1)
         if outputs.shape[1] != self.n_outputs_:
@@ -270,35 +252,60 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         return 0.15 if self.readable is True else float(self.readable)
 
     def _options(self, table: Table | None = None) -> dict[str, Any]:
-        """The options of a fit by the library's names. Without a table, signs are those of no particular columns."""
-        for name, choices in _choices.items():
-            if getattr(self, name) not in choices:
-                raise ValueError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(choices)}")
-        if not isinstance(self.cv, (int, np.integer)) and self.contiguous:
-            raise ValueError("contiguous is for a number of folds; here cv deals the rows itself")
-        values = {
-            "max_leaves": count("max_leaves", self.max_leaves),
-            "min_samples_leaf": count("min_samples_leaf", self.min_samples_leaf),
-            "rule": self.rule,
-            "validity": self.validity,
-            "local_models": self.local_models,
-            "sparse": self.sparse,
-            "loss": self.loss,
-            "cv": _folds(self.cv),
-            "contiguous": "contiguous" if self.contiguous else "random",
-            "random_state": self._seed(),
-            "select_features": bool(self.select_features),
-            "shared_tree": bool(self.shared_tree),
-            "monotonic_cst": self._trends(table),
-            "n_jobs": self._threads(),
-        }
-        return {field["name"]: values[field["parameter"]] for field in _core.fit_fields() if field["parameter"]}
+        """The options of a fit by the library's names. Without a table, signs are those of no particular columns.
 
-    def _trends(self, table: Table | None) -> list[str]:
+        A parameter that is no option as it stands has a method _read_NAME.
+        """
+        options = {}
+        for field in _core.fit_fields():
+            if name := field["parameter"]:
+                read = getattr(self, f"_read_{name}", None)
+                options[field["name"]] = read(table) if read else _value(field, getattr(self, name))
+        return options
+
+    def _refuse_others(self, sentence: str) -> None:
+        """Refuses parameters that the library does not have as options of a fit, and that were given.
+
+        `integer_codes` says something of the data; who calls this takes it.
+        """
+        options = {"integer_codes"} | {field["parameter"] for field in _core.fit_fields()}
+        for name, given in self.get_params(deep=False).items():
+            is_empty = given is False or (hasattr(given, "__len__") and len(given) == 0)
+            if name not in options and not is_empty:
+                raise ValueError(f"{name} {sentence}")
+
+    def _read_cv(self, table: Table | None) -> int:
+        if table is None and not isinstance(self.cv, (int, np.integer)):
+            raise ValueError("cv must be a number of folds here; only fit takes rows that were dealt by hand")
+        return _folds(self.cv)
+
+    def _read_contiguous(self, table: Table | None) -> str:
+        if self.contiguous and not isinstance(self.cv, (int, np.integer)):
+            raise ValueError("contiguous is for a number of folds; here cv deals the rows itself")
+        return "contiguous" if self.contiguous else "random"
+
+    def _read_random_state(self, table: Table | None) -> int:
+        return self._seed()
+
+    def _read_n_jobs(self, table: Table | None) -> int:
+        return self._threads()
+
+    def _read_monotonic_cst(self, table: Table | None) -> list[str]:
         if self.monotonic_cst is None:
             return []
         signs = [1] if table is None else _signs(self.monotonic_cst, self._inputs, table)
         return [{-1: "falling", 0: "any", 1: "rising"}[sign] for sign in signs]
+
+
+def _value(field: dict[str, Any], given: Any) -> Any:
+    """A parameter as the option that it is: a switch, a count or one of some choices."""
+    if field["kind"] == "switch":
+        return bool(given)
+    if field["kind"] == "count":
+        return count(field["parameter"], given)
+    if given not in field["choices"]:
+        raise ValueError(f"{field['parameter']} is {given!r}; it must be one of {', '.join(field['choices'])}")
+    return given
 
 
 def _given_folds(cv: Any, X: Any, y: Any, groups: Any, rows: int) -> tuple[int, np.ndarray]:

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._estimator import LocalLinearTreeRegressor, _of_fit_alone
+from ._estimator import LocalLinearTreeRegressor
 from ._model import Model
 from ._progress import Bar
 from .tables import read_table, read_targets
@@ -73,11 +73,9 @@ def start(
         For parameters that are not possible beyond one memory, by their names.
     """
     given = LocalLinearTreeRegressor() if estimator is None else estimator
-    for name, instead in _of_fit_alone.items():
-        if getattr(given, name):
-            raise ValueError(f"{name} is not possible beyond one memory; {instead}")
-    if not isinstance(given.cv, int):
-        raise ValueError("cv must be a number of folds beyond one memory; rows cannot be dealt by hand")
+    if len(given.categorical_features):
+        raise ValueError("categorical_features is not possible beyond one memory; name their categories by levels")
+    given._refuse_others("is not possible beyond one memory; fit a sample that fits into memory")
     names = [inputs] if isinstance(inputs, str) else [str(name) for name in inputs]
     by_name = {str(name): [str(level) for level in of_input] for name, of_input in (levels or {}).items()}
     for name in by_name:
