@@ -191,14 +191,15 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
             if levels:
                 raise ValueError(f'column "{name}" has words; partial_fit learns from numbers')
         if stream is None:
+            self._refuse_others("is not for streams")
+            options = self._options()
             self._remember_columns(table)
             self._is_flat = outputs.ndim == 1
             self.n_outputs_ = 1 if outputs.ndim == 1 else outputs.shape[1]
             self._inputs = names_of(table)
             self._outputs = names or target_names(self.n_outputs_)
             self._levels = table.levels
-            self._refuse_others("is not for streams")
-            stream = self._stream = StreamModel(self.n_features_in_, self.n_outputs_, self._options())
+            stream = self._stream = StreamModel(self.n_features_in_, self.n_outputs_, options)
         outputs = outputs.reshape(len(outputs), -1)
         if outputs.shape[1] != self.n_outputs_:
             raise ValueError(f"y has {outputs.shape[1]} targets, the rows before had {self.n_outputs_}")
