@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/between.hpp"
+
 namespace llmt {
 namespace {
 
@@ -38,11 +40,6 @@ std::vector<Distinct> distinct_values(const std::vector<RowOfValue>& rows, const
     result.back().weight += weights(row);
   }
   return result;
-}
-
-double halfway(double low, double high) {
-  const double middle = low + (high - low) / 2.0;
-  return middle < high ? middle : low;
 }
 
 // Cuts weights in a row into at most `most` parts of about equal weight, and returns the last index of each part. What
@@ -89,7 +86,7 @@ BinnedFeature bin_feature(BoostedFeature feature, const Eigen::VectorXd& values,
       weights_of_cells.back() += distinct[value].weight;
       sums_of_cells.back() += distinct[value].weight * distinct[value].value;
     }
-    if (value < std::ssize(distinct)) result.edges.push_back(halfway(distinct[last].value, distinct[value].value));
+    if (value < std::ssize(distinct)) result.edges.push_back(between(distinct[last].value, distinct[value].value));
   }
   result.last_cells = cut(weights_of_cells, most_bins);
   std::vector<std::uint8_t> bin_of_cell;

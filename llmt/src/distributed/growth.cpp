@@ -9,6 +9,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "base/between.hpp"
 #include "distributed/top_split.hpp"
 #include "stream/sums.hpp"
 
@@ -30,9 +31,6 @@ struct Weighted {
 // At most most_bins - 1 thresholds that each lie between two neighbouring values of the sample: at its quantiles.
 std::vector<double> edges_of(std::vector<Weighted> values) {
   std::ranges::sort(values, {}, &Weighted::value);
-  const auto between = [](double low, double high) {
-    return std::min(low + 0.5 * (high - low), std::nextafter(high, low));
-  };
   double all = 0.0;
   for (const Weighted& each : values) all += each.weight;
   std::vector<double> edges;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/between.hpp"
 #include "base/sum_over.hpp"
 #include "numerics/f_distribution.hpp"
 
@@ -63,14 +64,10 @@ bool GrowthData::is_significant(double level, double weight, int rank, double rs
 
 double GrowthData::place_threshold(double low, double high, double mean, const Eigen::VectorXd& apart,
                                    const Eigen::VectorXd& slope) const {
-  double threshold = low + 0.5 * (high - low);
   const double curvature = output_weights.dot(slope.cwiseAbs2());
   const Eigen::VectorXd at_low = apart + slope * (low - mean);
   const double meeting = curvature > 0.0 ? low - output_weights.dot(at_low.cwiseProduct(slope)) / curvature : low;
-  if (meeting > low && meeting < high) {
-    threshold = meeting;
-  }
-  return std::min(std::max(threshold, low), std::nextafter(high, low));
+  return meeting > low && meeting < high ? meeting : between(low, high);
 }
 
 }  // namespace llmt

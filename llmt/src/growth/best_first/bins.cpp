@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 
+#include "base/between.hpp"
 #include "base/count.hpp"
 #include "base/parallel.hpp"
 
@@ -19,9 +19,6 @@ std::vector<double> quantile_edges(std::vector<double> values, int bins) {
   std::ranges::sort(values);
   std::vector<double> distinct = values;
   distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-  const auto between = [](double low, double high) {
-    return std::min(low + 0.5 * (high - low), std::nextafter(high, low));
-  };
   std::vector<double> edges;
   if (std::ssize(distinct) <= bins) {
     for (std::size_t k = 0; k + 1 < distinct.size(); ++k) {

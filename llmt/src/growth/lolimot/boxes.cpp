@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/between.hpp"
 #include "constraints/signs.hpp"
 #include "data/missing.hpp"
 #include "growth/search/split_search.hpp"
@@ -97,9 +98,7 @@ std::optional<double> best_threshold_of(const LolimotData& data, const std::vect
   search.refine(std::numeric_limits<double>::infinity());
   const SplitCandidate found = search.best();
   if (found.input < 0) return std::nullopt;
-  const double low = values[found.left - 1];
-  const double high = values[found.left];
-  return std::min(low + 0.5 * (high - low), std::nextafter(high, low));
+  return between(values[found.left - 1], values[found.left]);
 }
 
 }  // namespace llmt

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <limits>
 
+#include "base/between.hpp"
 #include "base/parallel.hpp"
 #include "growth/search/split_search.hpp"
 
@@ -88,10 +89,8 @@ DeviationSplit split_number(const GrowthData& data, const DeviationNode& node, i
   std::ranges::transform(order, values.begin(), [&](int row) { return data.split_value(row, j); });
   DeviationSplit split;
   if (const Cut cut = best_cut(data, node, order, values, std::ssize(order) / least_share); cut.left > 0) {
-    const double low = values[cut.left - 1];
-    const double high = values[cut.left];
     split.input = j;
-    split.threshold = std::min(low + 0.5 * (high - low), std::nextafter(high, low));
+    split.threshold = between(values[cut.left - 1], values[cut.left]);
     split.decrease = cut.decrease;
   }
   return split;
