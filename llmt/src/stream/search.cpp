@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/between.hpp"
 #include "numerics/f_distribution.hpp"
 
 namespace llmt {
@@ -48,7 +49,7 @@ std::vector<double> LeafSearch::edges_of_first_rows(Eigen::Index input) const {
     const std::size_t at = b * values.size() / setting_.bins;
     const auto above = std::ranges::upper_bound(values, values[at > 0 ? at - 1 : 0]);
     if (above == values.end()) continue;
-    const double edge = *(above - 1) + 0.5 * (*above - *(above - 1));
+    const double edge = between(*(above - 1), *above);
     if (edges.empty() || edge > edges.back()) edges.push_back(edge);
   }
   return edges;

@@ -4,8 +4,10 @@
 #include <Eigen/QR>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
@@ -137,6 +139,30 @@ TEST(StreamSearch, EveryEdgeLeavesWhatBruteForceRefitsLeave) {
       EXPECT_NEAR(edges.rss_right[e], static_cast<double>(oracle::rss(known(right, Eigen::all), y(right, Eigen::all))),
                   1e-9);
     }
+  }
+}
+
+// The middle of two adjacent doubles is rounded to one of them, the middle of far ones overflows.
+TEST(StreamSearch, AnEdgeSeparatesNeighbouringValuesHoweverCloseOrFar) {
+  const double low = std::nextafter(1.0, 2.0);
+  const double huge = std::numeric_limits<double>::max();
+  for (const auto& [left, right] : {std::pair{low, std::nextafter(low, 2.0)}, {-huge, huge}}) {
+    llmt::StreamSetting setting = setting_for(1);
+    setting.scale(0) = right;
+    llmt::LeafSearch search(setting);
+    const llmt::Basis basis = origin_basis(1);
+    llmt::RowProducts products(setting.shape);
+    for (Eigen::Index i = 0; i < llmt::LeafSearch::rows_before_bins; ++i) {
+      const double x = i % 2 == 0 ? left : right;
+      const double z = setting.scaled(0, x);
+      products.set(basis, &z, 1.0, 1.0);
+      search.add({&x, &z, 1.0, 1.0, 1.0}, basis, products);
+    }
+    const llmt::LeafSearch::Edges edges = search.edges(0);
+    ASSERT_EQ(edges.thresholds.size(), 1U);
+    EXPECT_EQ(edges.rows_left[0], llmt::LeafSearch::rows_before_bins / 2);
+    EXPECT_LE(left, edges.thresholds[0]);
+    EXPECT_LT(edges.thresholds[0], right);
   }
 }
 
