@@ -57,35 +57,6 @@ std::vector<Bins> bins_of_inputs(const StateData& data, const NodeSums& sums, co
   return all;
 }
 
-// The sums of the rows on one side of every cut between two bins, added up from the outside inwards.
-std::vector<double> sums_of_side(const GramShape& shape, const Bins& bins, bool from_left) {
-  const std::size_t size = shape.size();
-  const std::size_t cuts = bins.size() - 1;
-  std::vector<double> sides(cuts * size, 0.0);
-  for (std::size_t step = 0; step < cuts; ++step) {
-    const std::size_t cut = from_left ? step : cuts - 1 - step;
-    double* const side = sides.data() + cut * size;
-    const double* const nearer = from_left ? side - size : side + size;
-    if (step > 0) std::copy(nearer, nearer + size, side);
-    add(shape, bins.grams[from_left ? cut : cut + 1], side);
-  }
-  return sides;
-}
-
-struct Sides {
-  std::vector<double> rss;
-  std::vector<int> rank;
-};
-
-Sides evaluate(const GramShape& shape, const std::vector<double>& grams) {
-  std::vector<const double*> each;
-  for (std::size_t at = 0; at < grams.size(); at += shape.size()) each.push_back(grams.data() + at);
-  Sides sides{std::vector<double>(each.size()), std::vector<int>(each.size())};
-  ResidualSums(shape, Eigen::VectorXd::Ones(1))
-      .evaluate(each.data(), std::ssize(each), sides.rss.data(), sides.rank.data());
-  return sides;
-}
-
 // The weight of the smaller child of the most even split.
 double most_even(const std::vector<Bins>& inputs, double weight) {
   double most = 0.0;
@@ -111,20 +82,22 @@ TopSplit best_split(const StateData& data, const NodeSums& sums, const TopNode& 
   const AdjustedRss scale(weight, rank, remaining(shape, node.gram.data(), change));
   const std::vector<Bins> inputs = bins_of_inputs(data, sums, change);
   const double least = std::min(std::floor(weight / smallest_part), most_even(inputs, weight));
+  ResidualSums models(shape, Eigen::VectorXd::Ones(1));
+  SidesOfCuts sides;
   TopSplit best;
   if (least < static_cast<double>(scale.enough_rows())) return best;
   for (const Bins& bins : inputs) {
-    const Sides left = evaluate(shape, sums_of_side(shape, bins, true));
-    const Sides right = evaluate(shape, sums_of_side(shape, bins, false));
+    sides.sum(shape, bins.grams);
+    sides.evaluate(models);
     Eigen::Index rows = 0;
     double before = 0.0;
     for (std::size_t cut = 0; cut + 1 < bins.size(); ++cut) {
       rows += bins.rows[cut];
       before += bins.weight(cut);
       if (std::min(before, weight - before) < least) continue;
-      const int ranks =
-          scale.counted(left.rank[cut], whole(before)) + scale.counted(right.rank[cut], whole(weight - before));
-      const double adjusted = scale.of(left.rss[cut] + right.rss[cut], ranks);
+      const int ranks = scale.counted(sides.rank_left[cut], whole(before)) +
+                        scale.counted(sides.rank_right[cut], whole(weight - before));
+      const double adjusted = scale.of(sides.rss_left[cut] + sides.rss_right[cut], ranks);
       if (adjusted >= best.adjusted) continue;
       best = {bins.input, adjusted, static_cast<Eigen::Index>(cut), {}, rows, before};
       if (bins.levels.empty()) continue;

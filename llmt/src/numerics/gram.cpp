@@ -236,4 +236,36 @@ void ResidualSums::evaluate(const double* const* grams, Eigen::Index count, doub
   }
 }
 
+void ResidualSums::evaluate(const std::vector<double>& grams, std::vector<double>& rss, std::vector<int>& rank) {
+  std::vector<const double*> each(grams.size() / shape_.size());
+  for (std::size_t i = 0; i < each.size(); ++i) each[i] = grams.data() + i * shape_.size();
+  rss.resize(each.size());
+  rank.resize(each.size());
+  evaluate(each.data(), std::ssize(each), rss.data(), rank.data());
+}
+
+void SidesOfCuts::sum(const GramShape& shape, std::span<const double* const> parts, const double* before,
+                      const double* behind) {
+  const Eigen::Index size = shape.size();
+  const Eigen::Index cuts = std::max<Eigen::Index>(0, std::ssize(parts) - 1);
+  const auto add_part = [&](const double* so_far, Eigen::Index part, double* gram) {
+    if (so_far != nullptr) {
+      std::copy(so_far, so_far + size, gram);
+    } else {
+      std::fill(gram, gram + size, 0.0);
+    }
+    add(shape, parts[part], gram);
+    return gram;
+  };
+  left.resize(cuts * size);
+  for (Eigen::Index cut = 0; cut < cuts; ++cut) before = add_part(before, cut, left.data() + cut * size);
+  right.resize(cuts * size);
+  for (Eigen::Index cut = cuts; cut-- > 0;) behind = add_part(behind, cut + 1, right.data() + cut * size);
+}
+
+void SidesOfCuts::evaluate(ResidualSums& models) {
+  models.evaluate(left, rss_left, rank_left);
+  models.evaluate(right, rss_right, rank_right);
+}
+
 }  // namespace llmt

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "numerics/tolerances.hpp"
@@ -86,6 +87,9 @@ class ResidualSums {
   /// rss[i] and rank[i] of grams[i], i < count.
   void evaluate(const double* const* grams, Eigen::Index count, double* rss, int* rank);
 
+  /// The same of all matrices in `grams`, which lie one after the other.
+  void evaluate(const std::vector<double>& grams, std::vector<double>& rss, std::vector<int>& rank);
+
   /// Frees the working memory, eight times that of a Gram matrix. evaluate() takes it again.
   void forget() { std::vector<Slot>().swap(scratch_); }
 
@@ -96,6 +100,26 @@ class ResidualSums {
   GramShape shape_;
   std::vector<double> weights_;
   std::vector<Slot> scratch_;
+};
+
+/// Both sides of every cut between two of several parts of rows that follow each other; of cut k, the parts up to k and
+/// those behind it.
+struct SidesOfCuts {
+  std::vector<double> left;  ///< Gram matrices, one after the other
+  std::vector<double> right;
+  std::vector<double> rss_left;
+  std::vector<double> rss_right;
+  std::vector<int> rank_left;
+  std::vector<int> rank_right;
+
+  /// Sums up the Gram matrices of the parts. Sums are only added to, from the outermost part inwards, and never
+  /// subtracted from, so that no digits are lost at the ends. `before`, `behind`: Gram matrices of rows that are left
+  /// or right of all cuts; null: there are none.
+  void sum(const GramShape& shape, std::span<const double* const> parts, const double* before = nullptr,
+           const double* behind = nullptr);
+
+  /// The models that follow from the sums.
+  void evaluate(ResidualSums& models);
 };
 
 }  // namespace llmt

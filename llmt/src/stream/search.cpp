@@ -130,37 +130,18 @@ LeafSearch::Edges LeafSearch::edges(int input) {
   const std::size_t count = bins.edges.size();
   if (count == 0) return result;
   const std::size_t size = setting_.shape.size();
-  // Left of each edge, then right of it, then all.
-  std::vector<double> grams((2 * count + 1) * size, 0.0);
-  for (std::size_t e = 0; e < count; ++e) {
-    double* const sum = grams.data() + e * size;
-    std::copy_n(e > 0 ? sum - size : sum, size, sum);
-    llmt::add(setting_.shape, bins.grams.data() + e * size, sum);
-    result.rows += bins.rows[e];
-    result.rows_left.push_back(result.rows);
+  std::vector<const double*> parts;
+  for (std::size_t bin = 0; bin <= count; ++bin) {
+    parts.push_back(bins.grams.data() + bin * size);
+    result.rows += bins.rows[bin];
+    if (bin < count) result.rows_left.push_back(result.rows);
   }
-  result.rows += bins.rows[count];
-  for (std::size_t e = count; e-- > 0;) {
-    double* const sum = grams.data() + (count + e) * size;
-    std::copy_n(e + 1 < count ? sum + size : sum, size, sum);
-    llmt::add(setting_.shape, bins.grams.data() + (e + 1) * size, sum);
-  }
-  std::copy_n(grams.data() + (count - 1) * size, size, grams.data() + 2 * count * size);
-  llmt::add(setting_.shape, bins.grams.data() + count * size, grams.data() + 2 * count * size);
-  std::vector<const double*> pointers;
-  for (std::size_t k = 0; k <= 2 * count; ++k) {
-    pointers.push_back(grams.data() + k * size);
-  }
-  std::vector<double> rss(pointers.size());
-  std::vector<int> rank(pointers.size());
-  residuals_.evaluate(pointers.data(), std::ssize(pointers), rss.data(), rank.data());
-  const Eigen::Index edge_count = std::ssize(bins.edges);
-  result.rss_left.assign(rss.begin(), rss.begin() + edge_count);
-  result.rss_right.assign(rss.begin() + edge_count, rss.end() - 1);
-  result.rank_left.assign(rank.begin(), rank.begin() + edge_count);
-  result.rank_right.assign(rank.begin() + edge_count, rank.end() - 1);
-  result.rss = rss.back();
-  result.rank = rank.back();
+  result.sum(setting_.shape, parts);
+  result.evaluate(residuals_);
+  std::vector<double> all(result.left.end() - setting_.shape.size(), result.left.end());
+  llmt::add(setting_.shape, parts.back(), all.data());
+  const double* const gram = all.data();
+  residuals_.evaluate(&gram, 1, &result.rss, &result.rank);
   return result;
 }
 

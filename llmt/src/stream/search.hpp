@@ -40,13 +40,9 @@ class LeafSearch {
   std::optional<StreamSplit> test(const Eigen::VectorXd& low, const Eigen::VectorXd& high, double different);
 
   /// The residual sums of squares for the edges between the bins of an input; empty before bins are laid out.
-  struct Edges {
+  struct Edges : SidesOfCuts {
     std::vector<double> thresholds;
     std::vector<Eigen::Index> rows_left;
-    std::vector<double> rss_left;
-    std::vector<double> rss_right;
-    std::vector<int> rank_left;
-    std::vector<int> rank_right;
     Eigen::Index rows = 0;  ///< in all bins
     double rss = 0.0;       ///< of one model
     int rank = 0;

@@ -61,16 +61,10 @@ class BinnedRows {
 
  private:
   /// Splits at the edges between the bins of one input, and what the search inside the bins starts from.
-  struct Edges {
+  struct Edges : SidesOfCuts {
     SplitCandidate best;
     std::vector<Eigen::Index> bins;  // those with rows
     std::vector<Eigen::Index> rows_before;
-    std::vector<double> grams_left;  // of the rows up to each edge
-    std::vector<double> grams_right;
-    std::vector<double> rss_left;
-    std::vector<double> rss_right;
-    std::vector<int> rank_left;
-    std::vector<int> rank_right;
     std::vector<double> bounds;  // of the RSS of splits inside each bin; infinity if there are none
     std::vector<int> ranks;      // and of the sum of their ranks
   };

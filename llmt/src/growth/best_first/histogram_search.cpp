@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <iterator>
 #include <limits>
 #include <numeric>
 
@@ -16,32 +15,6 @@ constexpr double no_edge = std::numeric_limits<double>::infinity();
 // may hold at most one row in this number of rows.
 constexpr Eigen::Index searched_part = 2;
 
-// Sums over the bins on one side of every edge, and the models that follow from them.
-struct SideOfEdges {
-  std::vector<double> grams;
-  std::vector<double> rss;
-  std::vector<int> rank;
-};
-
-// `grams`: of all bins of an input; `bins`: those that have rows. Sums are formed from the outermost bin inwards.
-SideOfEdges sum_side(const GramShape& shape, const Eigen::VectorXd& output_weights, std::span<const double> grams,
-                     const std::vector<Eigen::Index>& bins, bool from_left) {
-  const Eigen::Index size = shape.size();
-  const Eigen::Index count = std::max<Eigen::Index>(0, std::ssize(bins) - 1);
-  SideOfEdges side{std::vector<double>(count * size, 0.0), std::vector<double>(count), std::vector<int>(count)};
-  std::vector<const double*> at(count);
-  const double* before = nullptr;
-  for (Eigen::Index step = 0; step < count; ++step) {
-    const Eigen::Index edge = from_left ? step : count - 1 - step;
-    double* const gram = side.grams.data() + edge * size;
-    if (before != nullptr) std::copy(before, before + size, gram);
-    add(shape, grams.data() + bins[from_left ? edge : edge + 1] * size, gram);
-    before = at[edge] = gram;
-  }
-  ResidualSums(shape, output_weights).evaluate(at.data(), count, side.rss.data(), side.rank.data());
-  return side;
-}
-
 }  // namespace
 
 BinnedRows::Edges BinnedRows::search_edges(const Histogram& histogram, const std::vector<int>& node_rows,
@@ -55,22 +28,21 @@ BinnedRows::Edges BinnedRows::search_edges(const Histogram& histogram, const std
     return edges;
   }
   Eigen::Index all = 0;
+  std::vector<const double*> grams;
   for (std::size_t bin = 0; bin < rows.size(); ++bin) {
     if (rows[bin] > 0) {
+      grams.push_back(of_bin.data() + bin * shape_.size());
       edges.bins.push_back(bin);
       edges.rows_before.push_back(all);
       all += rows[bin];
     }
   }
-  SideOfEdges left = sum_side(shape_, data_.output_weights, of_bin, edges.bins, true);
-  SideOfEdges right = sum_side(shape_, data_.output_weights, of_bin, edges.bins, false);
-  edges.grams_left = std::move(left.grams);
-  edges.grams_right = std::move(right.grams);
-  edges.rss_left = std::move(left.rss);
-  edges.rss_right = std::move(right.rss);
-  const auto of_child = [&](int rank) { return scale.of_child(rank); };
-  std::ranges::transform(left.rank, std::back_inserter(edges.rank_left), of_child);
-  std::ranges::transform(right.rank, std::back_inserter(edges.rank_right), of_child);
+  ResidualSums models(shape_, data_.output_weights);
+  edges.sum(shape_, grams);
+  edges.evaluate(models);
+  for (std::vector<int>* ranks : {&edges.rank_left, &edges.rank_right}) {
+    std::ranges::transform(*ranks, ranks->begin(), [&](int rank) { return scale.of_child(rank); });
+  }
   edges.best = best_edge(edges, rows, node_rows, input, scale);
   bound_bins(edges, rows, input);
   return edges;
@@ -92,10 +64,10 @@ bool BinnedRows::rests_on_two_rows(const Edges& edges, std::size_t at, std::size
     return rank_without(features(), gram, next_to, sums) < rank;
   };
   // The outermost bins hold rows enough for a child.
-  const bool of_left = at > 0 && rests(at, edges.rank_left[at], edges.rank_left[at - 1],
-                                       edges.grams_left.data() + at * shape_.size(), true);
+  const bool of_left =
+      at > 0 && rests(at, edges.rank_left[at], edges.rank_left[at - 1], edges.left.data() + at * shape_.size(), true);
   return of_left || (at + 1 < edges.rank_right.size() && rests(at + 1, edges.rank_right[at], edges.rank_right[at + 1],
-                                                               edges.grams_right.data() + at * shape_.size(), false));
+                                                               edges.right.data() + at * shape_.size(), false));
 }
 
 // The best split at an edge between two bins.
@@ -184,10 +156,10 @@ SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::
       order.push_back(row);
     }
     const InputSearch::Beyond front{edges.rows_before[at],
-                                    at > 0 ? edges.grams_left.data() + (at - 1) * shape_.size() : nothing.data(),
+                                    at > 0 ? edges.left.data() + (at - 1) * shape_.size() : nothing.data(),
                                     at > 0 ? edges.rss_left[at - 1] : 0.0, at > 0 ? edges.rank_left[at - 1] : 0};
     const InputSearch::Beyond behind{std::ssize(rows) - front.rows - std::ssize(order),
-                                     last ? nothing.data() : edges.grams_right.data() + at * shape_.size(),
+                                     last ? nothing.data() : edges.right.data() + at * shape_.size(),
                                      last ? 0.0 : edges.rss_right[at], last ? 0 : edges.rank_right[at]};
     InputSearch search(node, values, order, data_.problem.options.min_leaf_samples, front, behind);
     search.refine(limit);

@@ -32,32 +32,6 @@ std::vector<std::vector<int>> level_orders(const GramShape& shape, std::span<con
   return orders;
 }
 
-// Sums of the levels' Gram matrices on one side of every cut of an order, and the models that follow from them.
-struct SideOfCuts {
-  std::vector<double> rss;
-  std::vector<int> rank;
-};
-
-// `grams`: of all levels. Sums are formed from the end of the order inwards.
-SideOfCuts sum_side(const GramShape& shape, std::span<const double> grams, const std::vector<int>& order,
-                    bool from_left, ResidualSums& models) {
-  const Eigen::Index size = shape.size();
-  const Eigen::Index cuts = std::ssize(order) - 1;
-  std::vector<double> sums(cuts * size, 0.0);
-  std::vector<const double*> at(cuts);
-  const double* before = nullptr;
-  for (Eigen::Index step = 0; step < cuts; ++step) {
-    const Eigen::Index cut = from_left ? step : cuts - 1 - step;
-    double* const to = sums.data() + cut * size;
-    if (before != nullptr) std::copy(before, before + size, to);
-    add(shape, grams.data() + order[from_left ? cut : cut + 1] * size, to);
-    before = at[cut] = to;
-  }
-  SideOfCuts side{std::vector<double>(cuts), std::vector<int>(cuts)};
-  models.evaluate(at.data(), cuts, side.rss.data(), side.rank.data());
-  return side;
-}
-
 // SplitCandidate::level_side of an order whose first `left` levels go left.
 std::vector<int> sides_of_levels(const std::vector<int>& order, std::size_t left, std::size_t levels) {
   std::vector<int> sides(levels, 0);
@@ -75,25 +49,30 @@ SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd&
   const Eigen::Index present = std::accumulate(counts.begin(), counts.end(), Eigen::Index{0});
   const double tolerance = tie_tolerance * scale.of_node();
   ResidualSums models(shape, weights);
+  SidesOfCuts sides;
+  std::vector<const double*> ordered;
   SplitCandidate best;
   for (const std::vector<int>& order : level_orders(shape, grams, counts)) {
-    const SideOfCuts left = sum_side(shape, grams, order, true, models);
-    const SideOfCuts right = sum_side(shape, grams, order, false, models);
+    ordered.clear();
+    for (const int level : order) ordered.push_back(grams.data() + level * shape.size());
+    sides.sum(shape, ordered);
+    sides.evaluate(models);
     Eigen::Index rows_left = 0;
-    for (std::size_t k = 0; k < left.rss.size(); ++k) {
+    for (std::size_t k = 0; k < sides.rss_left.size(); ++k) {
       rows_left += counts[order[k]];
       if (rows_left < min_leaf_samples || present - rows_left < min_leaf_samples) continue;
-      const double rss = left.rss[k] + right.rss[k] + without_value;
+      const double rss = sides.rss_left[k] + sides.rss_right[k] + without_value;
       ++best.tested;
-      const int ranks = scale.counted(left.rank[k], rows_left) + scale.counted(right.rank[k], present - rows_left);
+      const int ranks =
+          scale.counted(sides.rank_left[k], rows_left) + scale.counted(sides.rank_right[k], present - rows_left);
       const double adjusted = scale.of(rss, ranks);
       if (best.input >= 0 && adjusted >= best.adjusted - tolerance) continue;
       best.input = 0;
       best.adjusted = std::max(0.0, adjusted);
       best.left = rows_left;
       best.rss = std::max(0.0, rss);
-      best.rank_left = left.rank[k];
-      best.rank_right = right.rank[k];
+      best.rank_left = sides.rank_left[k];
+      best.rank_right = sides.rank_right[k];
       best.level_side = sides_of_levels(order, k + 1, counts.size());
     }
   }

@@ -86,49 +86,29 @@ Eigen::Index InputSearch::size_of_sums(const GramShape& shape, Eigen::Index rows
   return sums_of_piece * shape.size() * (rows / rows_of_block(shape, rows) + 1);
 }
 
-// Gram matrices between the edges, and on either side of the inner edges, that is of all but the first and the last.
+// Gram matrices between the edges, and on either side of the inner edges.
 void InputSearch::sum_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind,
                             Sides& sides) const {
-  const Eigen::Index size = shape_.size();
-  const Eigen::Index inner = std::ssize(edges) - 2;
-  sides.left.resize(inner * size);
-  sides.right.resize(inner * size);
-  sides.parts.assign((inner + 1) * size, 0.0);
-  for (Eigen::Index i = 0; i <= inner; ++i) {
+  const std::size_t size = shape_.size();
+  std::vector<const double*> parts(edges.size() - 1);
+  sides.parts.assign(parts.size() * size, 0.0);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
     const Eigen::Index begin = edges[i];
     add_rows(node_.features, order_.data() + begin, edges[i + 1] - begin, sides.parts.data() + i * size);
+    parts[i] = sides.parts.data() + i * size;
   }
-  const auto sum = [&](const double* so_far, Eigen::Index part, double* gram) {
-    std::copy(so_far, so_far + size, gram);
-    add(shape_, sides.parts.data() + part * size, gram);
-    return gram;
-  };
-  const double* last = before;
-  for (Eigen::Index i = 0; i < inner; ++i) {
-    last = sum(last, i, sides.left.data() + i * size);
-  }
-  last = behind;
-  for (Eigen::Index i = inner; i-- > 0;) {
-    last = sum(last, i + 1, sides.right.data() + i * size);
-  }
+  sides.sum(shape_, parts, before, behind);
 }
 
 // As above, and the RSS on either side.
 void InputSearch::take_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind,
                              Sides& sides) {
   sum_sides(edges, before, behind, sides);
-  const std::size_t inner = edges.size() - 2;
-  const auto evaluate = [&](const std::vector<double>& sums, std::vector<double>& rss, std::vector<int>& rank) {
-    std::vector<const double*> grams(inner);
-    for (std::size_t i = 0; i < inner; ++i) grams[i] = sums.data() + i * shape_.size();
-    rss.resize(inner);
-    rank.resize(inner);
-    sums_.evaluate(grams.data(), inner, rss.data(), rank.data());
-    std::ranges::transform(rank, rank.begin(), [&](int each) { return scale_.of_child(each); });
-  };
-  evaluate(sides.left, sides.rss_left, sides.rank_left);
-  evaluate(sides.right, sides.rss_right, sides.rank_right);
-  evaluations_ += inner;
+  sides.evaluate(sums_);
+  for (std::vector<int>* ranks : {&sides.rank_left, &sides.rank_right}) {
+    std::ranges::transform(*ranks, ranks->begin(), [&](int rank) { return scale_.of_child(rank); });
+  }
+  evaluations_ += std::ssize(sides.rss_left);
 }
 
 // Whether the two rows next to a split at the inner edge `at` decide a direction of a child's model: without them the

@@ -114,15 +114,9 @@ class InputSearch {
     int rank_left;
     int rank_right;
   };
-  /// Gram matrices on either side of some edges, and the models that follow from them.
-  struct Sides {
-    std::vector<double> parts;  // between the edges
-    std::vector<double> left;
-    std::vector<double> right;
-    std::vector<double> rss_left;
-    std::vector<double> rss_right;
-    std::vector<int> rank_left;
-    std::vector<int> rank_right;
+  /// Either side of the inner edges, that is of all but the first and the last.
+  struct Sides : SidesOfCuts {
+    std::vector<double> parts;  // Gram matrices between the edges
   };
 
   bool admissible(Eigen::Index left) const;
