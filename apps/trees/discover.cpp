@@ -56,23 +56,15 @@ std::vector<discovery::ModelTerm> of_families_to_try(const DiscoverArguments& ar
 
 std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& arguments, const Comparison& comparison,
                                                std::vector<discovery::UntestableCause>& untestable) {
-  std::vector<discovery::ModelTerm> library = discovery::standard_terms(comparison.inputs, &untestable);
-  for (discovery::ModelTerm& term :
-       discovery::inner_state_terms(comparison.inputs, comparison.simulated, arguments.outputs)) {
-    library.push_back(std::move(term));
-  }
-  library = of_families_to_try(arguments, std::move(library));
+  std::vector<discovery::ModelTerm> library = of_families_to_try(
+      arguments, report::library_terms(comparison.inputs, comparison.simulated, arguments.outputs, untestable));
   if (arguments.terms.empty()) return library;
   std::vector<std::string> taken;
   for (const discovery::ModelTerm& term : library) taken.push_back(term.family);
   const std::string output = arguments.outputs.size() == 1 ? arguments.outputs.front() : "";
   const discovery::Rows rows = discovery::rows_of(comparison.inputs, comparison.simulated.col(0));
-  std::vector<discovery::ModelTerm> terms = read_terms(arguments.terms, comparison.inputs, output, rows, taken);
-  library = discovery::without_duplicates(std::move(library), terms, rows);
-  for (discovery::ModelTerm& term : library) {
-    if (!arguments.own_terms_only || term.generic) terms.push_back(std::move(term));
-  }
-  return terms;
+  return report::with_own_terms(std::move(library), read_terms(arguments.terms, comparison.inputs, output, rows, taken),
+                                arguments.own_terms_only, rows);
 }
 
 // A column that nobody measured is often all zeros.

@@ -83,34 +83,26 @@ discovery::Parameter parameter_of(const nb::dict& given) {
           .prior_value = optional("prior_value")};
 }
 
-// The library's terms, and one's own in their place where they are the same.
+// The library's terms, and one's own in their place where they are the same. `in_time`: with those of inner states,
+// which are of rows that follow each other.
 std::vector<discovery::ModelTerm> terms_of(const Question& question, const std::vector<OwnTerm>& own_terms,
                                            bool own_terms_only, bool in_time,
                                            std::vector<discovery::UntestableCause>& untestable) {
-  std::vector<discovery::ModelTerm> library = discovery::standard_terms(question.inputs, &untestable);
-  // They are of rows that follow each other.
-  if (in_time) {
-    for (discovery::ModelTerm& term :
-         discovery::inner_state_terms(question.inputs, question.simulated, question.outputs)) {
-      library.push_back(std::move(term));
-    }
-  }
+  std::vector<discovery::ModelTerm> library =
+      in_time ? report::library_terms(question.inputs, question.simulated, question.outputs, untestable)
+              : discovery::standard_terms(question.inputs, &untestable);
   library = discovery::of_families(std::move(library), question.only, question.without);
   if (own_terms.empty()) return library;
-  std::vector<discovery::ModelTerm> terms;
-  for (const OwnTerm& own : own_terms) {
-    const std::string& name = std::get<0>(own);
+  std::vector<discovery::ModelTerm> own;
+  for (const OwnTerm& given : own_terms) {
+    const std::string& name = std::get<0>(given);
     if (std::ranges::find(library, name, &discovery::ModelTerm::family) != library.end()) {
       throw std::invalid_argument(fmt::format("terms: \"{}\" is the name of a built-in term", name));
     }
-    terms.push_back(term_of(own));
+    own.push_back(term_of(given));
   }
-  const discovery::Rows rows = discovery::rows_of(question.inputs, question.simulated.col(0));
-  library = discovery::without_duplicates(std::move(library), terms, rows);
-  for (discovery::ModelTerm& term : library) {
-    if (!own_terms_only || term.generic) terms.push_back(std::move(term));
-  }
-  return terms;
+  return report::with_own_terms(std::move(library), std::move(own), own_terms_only,
+                                discovery::rows_of(question.inputs, question.simulated.col(0)));
 }
 
 // `predict` is a callable or None: the simulation is known by its outputs alone then, at the rows of `tabulated`.

@@ -49,6 +49,17 @@ struct TermsSummary {
   std::string group = {};                         ///< column with the runs; may be empty
 };
 
+/// The library's terms: standard_terms(), then inner_state_terms().
+std::vector<discovery::ModelTerm> library_terms(const discovery::Inputs& inputs, const Eigen::MatrixXd& simulated,
+                                                const std::vector<std::string>& outputs,
+                                                std::vector<discovery::UntestableCause>& untestable);
+
+/// The user's own terms, then those of the library that are not the same as one of them. `own_only`: of the library,
+/// only the generic ones.
+std::vector<discovery::ModelTerm> with_own_terms(std::vector<discovery::ModelTerm> library,
+                                                 std::vector<discovery::ModelTerm> own, bool own_only,
+                                                 const discovery::Rows& rows);
+
 /// Cuts the rows searched where the absolute deviation changes most, by a small tree.
 std::vector<GapRegion> gap_regions(const discovery::Inputs& inputs, const discovery::MeasuredOutputs& measured,
                                    const discovery::Missing& missing);
