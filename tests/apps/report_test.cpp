@@ -8,6 +8,7 @@
 #include "apps/program.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
+#include "report/document/document_text.hpp"
 #include "report/document/figures.hpp"
 #include "report/document/page.hpp"
 #include "report/fit/fit_summary.hpp"
@@ -63,6 +64,23 @@ TEST(Report, HostileNamesStayData) {
 TEST(Report, NamesThatAreNotUtf8DoNotStopIt) {
   const std::string page = filled_page(sample_page, {.title = "\xff", .answer = "a\xfe"}, "");
   EXPECT_EQ(data_of(page)["answer"], "a\xef\xbf\xbd");
+}
+
+TEST(Report, ATerminalShowsTheWordsAndTablesOfADocument) {
+  const Grid values{.title = "Values", .caption = "In mm.", .header = {"name", "value"}, .rows = {{"a", "1.5"}}};
+  const Json picture = block(Chart{.title = "picture", .x = {}, .y = {}, .layers = {}});
+  Document document{.title = "title", .subject = "table.csv: 3 rows", .answer = "Yes.", .notes = {"Note: few rows"}};
+  document.main = Chart{.title = "main", .x = {}, .y = {}, .layers = {}};
+  document.beside_main = {block(values)};
+  document.sections = {{"pictures alone", "not shown", {picture}},
+                       {"words", "Shown.", {text_block("", {"One.", "Two."}), text_block("Titled", {"Three."})}},
+                       {"a table for a picture", "", {or_table(picture, values)}}};
+  EXPECT_EQ(document_text(document),
+            "table.csv: 3 rows\nYes.\nNote: few rows\n"
+            "\nValues\nname  value\na       1.5\nIn mm.\n"
+            "\nShown.\nOne.\nTwo.\n\nTitled\n  Three.\n"
+            "\nValues\nname  value\na       1.5\nIn mm.\n");
+  EXPECT_EQ(to_json(document)["lead"], "table.csv: 3 rows. Note: few rows.");
 }
 
 TEST(Report, NumbersHaveSixDigitsAndNoNumberIsNull) {

@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <string_view>
 
 namespace llmt::report {
 namespace {
@@ -58,6 +59,19 @@ Json rows_of(const Eigen::MatrixXd& values) {
   Json rows = Json::array();
   for (Eigen::Index i = 0; i < values.rows(); ++i) rows.push_back(numbers(numbers_of(values.row(i).transpose())));
   return rows;
+}
+
+// All that stands between the answer and the first picture, as one paragraph.
+std::string lead_of(const Document& document) {
+  std::vector<std::string> sentences = {document.subject, document.lead};
+  sentences.insert(sentences.end(), document.notes.begin(), document.notes.end());
+  std::string text;
+  for (const std::string& sentence : sentences) {
+    if (sentence.empty()) continue;
+    text += (text.empty() ? "" : " ") + sentence +
+            (std::string_view(".?!").find(sentence.back()) != std::string_view::npos ? "" : ".");
+  }
+  return text;
 }
 
 template <typename Block>
@@ -159,8 +173,13 @@ Json text_block(const std::string& title, const std::vector<std::string>& lines)
   return {{"kind", "text"}, {"title", title}, {"lines", lines}};
 }
 
+Json or_table(Json picture, const Grid& table) {
+  picture["in_words"] = block(table);
+  return picture;
+}
+
 Json to_json(const Document& document) {
-  Json json = {{"title", document.title}, {"answer", document.answer}, {"lead", document.lead}};
+  Json json = {{"title", document.title}, {"answer", document.answer}, {"lead", lead_of(document)}};
   json["sections"] = Json::array();
   const auto add = [&](const Section& section) {
     if (section.blocks.empty()) return;

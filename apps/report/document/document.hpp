@@ -1,6 +1,7 @@
 /// \file
 /// What a report shows, as plain data: sections of blocks. The page's script (page/) draws them in a browser, gnuplot
-/// the chart that stands for the whole (plot.hpp). Neither knows a command; a command knows neither.
+/// the chart that stands for the whole (plot.hpp), and document_text.hpp writes its words and tables for a terminal.
+/// None of them knows a command.
 ///
 /// A name of a colour is a role, not a colour: data, model, before, after, muted, floor, bad, up, down.
 #pragma once
@@ -131,19 +132,24 @@ struct Grid {
 };
 Json block(const Grid& grid);
 
-/// Sentences.
+/// Sentences. A terminal indents those below a title.
 Json text_block(const std::string& title, const std::vector<std::string>& lines);
 
+/// The picture, and the table that a terminal shows in its place.
+Json or_table(Json picture, const Grid& table);
+
 struct Section {
-  std::string title;
-  std::string text = {};
+  std::string title;      ///< on the page; a terminal has the titles of blocks alone
+  std::string text = {};  ///< a terminal shows it if there are words or tables among the blocks
   std::vector<Json> blocks = {};
 };
 
 struct Document {
-  std::string title;      ///< what was done with what: "llmt fit concrete.csv"
-  std::string answer;     ///< the answer in one sentence
-  std::string lead = {};  ///< one or two more
+  std::string title;                    ///< what was done with what: "llmt fit concrete.csv"
+  std::string subject = {};             ///< what was read: "concrete.csv: 1030 rows of 8 inputs"
+  std::string answer;                   ///< the answer in one sentence
+  std::string lead = {};                ///< one or two more
+  std::vector<std::string> notes = {};  ///< sentences to be read before anything below is believed
   std::optional<Chart> main = {};
   std::vector<Json> beside_main = {};
   std::vector<Section> sections = {};
