@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "llmt/csv.hpp"
+#include "report/document/document_text.hpp"
 #include "report/fit/comparison.hpp"
-#include "report/fit/of_comparison.hpp"
 #include "shared/cli.hpp"
 #include "shared/report_files.hpp"
 #include "shared/table_file.hpp"
@@ -46,20 +46,16 @@ void compare_command(CompareArguments arguments) {
   if (no_sum.empty()) methods.push_back(boosted_method(table.options));
   const ComparisonResult result = compare(*table.data, methods, options);
   bar.clear();
-  std::string reports;
-  if (arguments.reports.wanted()) {
-    reports = write_reports(arguments.reports,
-                            report::comparison_report({arguments.learning.data, arguments.learning.targets.front(),
-                                                       table.data->inputs.rows(), table.data->inputs.cols(), result}));
-  }
   const std::string& target = arguments.learning.targets.front();
-  report::FitRun run{arguments.learning.data, table.options, *table.data, table.lines, ""};
+  report::FitRun run{table_name(arguments.learning.data), table.options, *table.data, table.lines, ""};
+  const report::Document document = report::comparison_report(run, target, result);
+  const std::string reports = arguments.reports.wanted() ? write_reports(arguments.reports, document) : "";
   if (arguments.json) {
+    run.data = arguments.learning.data;
     print_json(report::comparison_json(run, target, result));
     return;
   }
-  run.data = table_name(run.data);
-  print(report::comparison_text(run, target, result, output_width()));
+  print(report::document_text(document, output_width()));
   if (!no_sum.empty()) print(fmt::format("A sum of trees (--boost) is not compared: {}.\n", no_sum));
   print(reports);
 }

@@ -8,6 +8,7 @@
 #include "llmt/fit.hpp"
 #include "llmt/readable.hpp"
 #include "llmt/teach.hpp"
+#include "report/document/document_text.hpp"
 #include "report/fit/fit_summary.hpp"
 #include "report/fit/of_fit.hpp"
 #include "report/fit/readable_summary.hpp"
@@ -87,7 +88,7 @@ std::optional<ReadableResult> make_readable(const FitArguments& arguments, const
 // A report shows a readable tree beside the model wherever one can be made. It does not show rows that the loss leaves
 // out: they would set the axes.
 std::string write_fit_reports(const FitArguments& arguments, const LearningTable& table, const Fitting& fitting,
-                              const std::optional<ReadableResult>& readable) {
+                              const std::optional<ReadableResult>& readable, const report::Document& words) {
   if (!arguments.reports.wanted()) return "";
   const FitResult& result = fitting.result;
   std::optional<ReadableResult> shown = readable;
@@ -98,8 +99,9 @@ std::string write_fit_reports(const FitArguments& arguments, const LearningTable
   const TrainingData& data = *table.data;
   const std::vector<Eigen::Index> left_out = report::rows_left_out(result.summary.loss_weights, data.weights);
   const auto report_on = [&](const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const FitResult& of_rows) {
-    return write_reports(arguments.reports, report::fit_report({arguments.learning.data, inputs, outputs, table.options,
-                                                                of_rows, shown, std::ssize(left_out)}));
+    const report::Fitted fitted{arguments.learning.data, inputs, outputs, table.options, of_rows, shown,
+                                std::ssize(left_out)};
+    return write_reports(arguments.reports, report::fit_report(fitted, words));
   };
   if (left_out.empty()) return report_on(data.inputs, data.outputs, result);
   std::vector<Eigen::Index> kept;
@@ -139,19 +141,20 @@ void fit_command(FitArguments arguments) {
   }
   std::optional<ReadableResult> readable;
   if (!arguments.readable.empty()) readable = make_readable(arguments, fitting, loss);
-  const std::string reports = write_fit_reports(arguments, table, fitting, readable);
-  report::FitRun run{arguments.learning.data, table.options, *table.data, table.lines, arguments.output};
+  report::FitRun run{table_name(arguments.learning.data), table.options, *table.data, table.lines, arguments.output};
+  report::Document words = report::fit_words(run, result);
+  if (fitting.taught) words.sections.push_back(report::teaching_words(*fitting.taught));
+  if (readable) words.sections.push_back(report::readable_words(result, *readable, loss));
+  const std::string reports = write_fit_reports(arguments, table, fitting, readable, words);
   if (arguments.json) {
+    run.data = arguments.learning.data;
     Json summary = report::fit_json(run, result);
     if (fitting.taught) summary["teaching"] = report::teaching_json(*fitting.taught);
     if (readable) summary["readable"] = report::readable_json(*readable);
     print_json(summary);
     return;
   }
-  run.data = table_name(run.data);
-  print(report::fit_text(run, result, output_width()));
-  if (fitting.taught) print(report::teaching_text(*fitting.taught, output_width()));
-  if (readable) print(report::readable_text(result, *readable, loss, output_width()));
+  print(report::document_text(words, output_width()));
   if (readable && !arguments.output.empty()) {
     print(fmt::format("Readable tree written to {}; llmt inspect --rules prints it\n",
                       beside(arguments.output, readable_extension).string()));

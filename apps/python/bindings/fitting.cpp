@@ -21,6 +21,7 @@
 #include "python/bindings/module.hpp"
 #include "python/bindings/options.hpp"
 #include "python/bindings/rows.hpp"
+#include "report/document/document_text.hpp"
 #include "report/document/page.hpp"
 #include "report/fit/fit_accuracy.hpp"
 #include "report/fit/fit_summary.hpp"
@@ -84,10 +85,8 @@ class Fit {
   }
 
   std::string text(const std::string& data, std::size_t width) const {
-    std::string text = report::fit_text(run(data), *result_, width);
-    if (taught_) text += report::teaching_text(*taught_, width);
-    if (readable_) text += report::readable_text(*result_, *readable_, loss_, width);
-    return text;
+    constexpr std::size_t indent = 2;
+    return report::wrapped(report::document_text(words(data), width), width, indent);
   }
 
   std::vector<std::vector<Eigen::Index>> held_out() const { return result_->summary.held_out; }
@@ -121,19 +120,26 @@ class Fit {
           nb::none());
     }
     const TrainingData& rows = prepared_->data();
-    return report::filled_page(report::empty_page(),
-                               report::fit_report({data, rows.inputs, rows.outputs, options_, *result_, shown, 0}),
-                               origin);
+    return report::filled_page(
+        report::empty_page(),
+        report::fit_report({data, rows.inputs, rows.outputs, options_, *result_, shown, 0}, words(data)), origin);
   }
 
   std::string document(const std::string& data) const {
     const TrainingData& rows = prepared_->data();
-    return report::to_json(report::fit_report({data, rows.inputs, rows.outputs, options_, *result_, readable_, 0}))
-        .dump();
+    const report::Fitted fitted{data, rows.inputs, rows.outputs, options_, *result_, readable_, 0};
+    return report::to_json(report::fit_report(fitted, words(data))).dump();
   }
 
  private:
   report::FitRun run(const std::string& data) const { return {data, options_, prepared_->data(), lines_, ""}; }
+
+  report::Document words(const std::string& data) const {
+    report::Document words = report::fit_words(run(data), *result_);
+    if (taught_) words.sections.push_back(report::teaching_words(*taught_));
+    if (readable_) words.sections.push_back(report::readable_words(*result_, *readable_, loss_));
+    return words;
+  }
 
   FitOptions options_;
   double loss_;

@@ -1,5 +1,5 @@
 /// \file
-/// A comparison of methods as text and as JSON.
+/// A comparison of methods as a document and as JSON.
 #pragma once
 
 #include <string>
@@ -13,8 +13,7 @@ namespace llmt::report {
 /// that the methods share; `target`: the name of the output.
 Json comparison_json(const FitRun& run, const std::string& target, const ComparisonResult& result);
 
-/// The same for people. `width`: of the table.
-std::string comparison_text(const FitRun& run, const std::string& target, const ComparisonResult& result,
-                            std::size_t width = no_width_limit);
+/// The same for people, on a page and on a terminal.
+Document comparison_report(const FitRun& run, const std::string& target, const ComparisonResult& result);
 
 }  // namespace llmt::report

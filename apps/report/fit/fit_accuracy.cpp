@@ -125,27 +125,6 @@ Chart error_over_leaves(const PartitionSummary& partition) {
   return chart;
 }
 
-Json kinds_table(const PartitionSummary& partition, const std::optional<ReadableResult>& readable, std::size_t p) {
-  Grid grid{.title = "Smooth against discontinuous",
-            .caption = "The best of each kind, judged on the same held-out rows.",
-            .header = {"model", "equations", "RMSE held-out", "spread of folds"},
-            .rows = {}};
-  const auto add = [&](const std::string& name, Eigen::Index leaves, double rmse, double spread) {
-    grid.rows.push_back({name, std::to_string(leaves), number(rmse), spread_text(spread, partition.cv_folds)});
-  };
-  std::vector<CandidateError> shown = best_of_kinds(partition);
-  std::ranges::stable_sort(shown, std::greater{}, &CandidateError::rmse);
-  for (const CandidateError& entry : shown) {
-    if (entry.candidate == partition.chosen.candidate) grid.marked = static_cast<int>(grid.rows.size());
-    add(kind_of(entry.candidate), entry.candidate.leaves, entry.rmse, entry.spread);
-  }
-  if (readable) {
-    const ReadablePartition& short_rules = readable->partitions[p];
-    add("readable tree", short_rules.leaves, short_rules.rmse, short_rules.spread);
-  }
-  return block(grid);
-}
-
 Chart error_histogram(const HeldOutRows& rows) {
   Chart chart = histogram("How large the errors are", "predicted - observed", {{"", "model", rows.errors}});
   chart.references = {{true, -rows.p90, ""}, {true, rows.p90, "nine of ten"}};

@@ -29,7 +29,4 @@ Chart error_histogram(const HeldOutRows& rows);
 /// The held-out error over the number of leaves, and the best of each kind with the spread of its folds.
 Chart error_over_leaves(const PartitionSummary& partition);
 
-/// The best of each kind beside each other, the readable tree of the partition among them.
-Json kinds_table(const PartitionSummary& partition, const std::optional<ReadableResult>& readable, std::size_t p);
-
 }  // namespace llmt::report

@@ -1,11 +1,12 @@
 /// \file
-/// A fit as text and as JSON.
+/// A fit as words and as JSON.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "llmt/fit.hpp"
+#include "report/document/document.hpp"
 #include "report/text/json.hpp"
 #include "report/text/text.hpp"
 
@@ -42,7 +43,7 @@ std::vector<Eigen::Index> lines_at(const std::vector<Eigen::Index>& lines, const
 /// Rows, settings, what was compared and what was chosen.
 Json fit_json(const FitRun& run, const FitResult& result);
 
-/// The same for people. `width`: of tables.
-std::string fit_text(const FitRun& run, const FitResult& result, std::size_t width = no_width_limit);
+/// The same for people: subject, notes, and a section with the models that were compared.
+Document fit_words(const FitRun& run, const FitResult& result);
 
 }  // namespace llmt::report

@@ -1,4 +1,4 @@
-#include "report/fit/of_comparison.hpp"
+#include "report/fit/comparison.hpp"
 
 #include <fmt/format.h>
 
@@ -10,6 +10,11 @@
 
 namespace llmt::report {
 namespace {
+
+struct Compared {
+  const std::string& target;
+  const ComparisonResult& result;
+};
 
 Chart errors_chart(const Compared& of) {
   std::vector<std::string> names;
@@ -68,8 +73,7 @@ Chart folds_chart(const Compared& of) {
 }
 
 Json methods_table(const Compared& of) {
-  Grid grid{.title = "All figures",
-            .header = {"method", "equations", "numbers in the model", "RMSE held-out", "+-", "largest jump", "fit, s",
+  Grid grid{.header = {"method", "leaves", "parameters", "RMSE held-out", "spread of folds", "largest jump", "fit, s",
                        "predict 1e6 rows, s"},
             .rows = {},
             .marked = static_cast<int>(of.result.recommended),
@@ -83,14 +87,41 @@ Json methods_table(const Compared& of) {
   return block(grid);
 }
 
+// What one tree costs in error beside a sum of trees, and what either can be asked.
+std::string cost_of_reading(const std::vector<Comparison>& methods) {
+  const Comparison* sum = nullptr;
+  const Comparison* tree = nullptr;
+  for (const Comparison& method : methods) {
+    const Comparison*& best = method.is_sum ? sum : tree;
+    if (best == nullptr || method.cv_rmse < best->cv_rmse) best = &method;
+  }
+  if (sum == nullptr || tree == nullptr || !(sum->cv_rmse > 0.0)) return "";
+  const double cost = 100.0 * (tree->cv_rmse / sum->cv_rmse - 1.0);
+  const std::string verdict =
+      cost > 0.0 ? fmt::format("reading costs {:.1f} % more error", cost) : "reading costs nothing here";
+  return fmt::format(
+      " One tree ({}) {}, {} {}: {}. A tree has rules, equations, monotone inputs and derivatives; a sum has "
+      "predictions, contributions of the inputs and C.",
+      tree->method, number(tree->cv_rmse), sum->method, number(sum->cv_rmse), verdict);
+}
+
 }  // namespace
 
-Document comparison_report(const Compared& of) {
-  Document document{.title = fmt::format("llmt compare {}", file_name(of.data)), .answer = of.result.recommendation};
-  document.lead = fmt::format("{} rows, {} inputs, target {}; {} folds, every choice made inside the fold.", of.rows,
-                              of.inputs, of.target, of.result.methods.front().fold_rmse.size());
+Document comparison_report(const FitRun& run, const std::string& target, const ComparisonResult& result) {
+  const Compared of{target, result};
+  const TrainingData& rows = run.rows;
+  Document document{.title = fmt::format("llmt compare {}", file_name(run.data)), .answer = result.recommendation};
+  document.lead = fmt::format(
+      "{}: {} rows, {} inputs; {}, {} folds{}, every choice made inside the fold.{}", file_name(run.data),
+      rows.inputs.rows(), rows.inputs.cols(), target, result.methods.front().fold_rmse.size(),
+      run.options.folds.kind == FoldKind::contiguous ? " of contiguous rows" : "", cost_of_reading(result.methods));
+  if (run.options.loss == Loss::tukey) {
+    const std::vector<Eigen::Index> left_out = rows_left_out(result.loss_weights, rows.weights);
+    const Eigen::Index weighted = rows.weights.size() > 0 ? (rows.weights.array() > 0.0).count() : rows.inputs.rows();
+    document.notes = {left_out_by_loss(lines_at(run.lines, left_out), weighted)};
+  }
   document.main = errors_chart(of);
-  document.beside_main = {block(trade(of, "Error over size", "numbers in the model", [](const Comparison& method) {
+  document.beside_main = {block(trade(of, "Error over size", "parameters", [](const Comparison& method) {
     return static_cast<double>(method.parameters);
   }))};
   document.sections.push_back({"To check",

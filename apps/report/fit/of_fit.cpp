@@ -89,20 +89,21 @@ void add_output(const Fitted& fitted, std::size_t p, std::size_t o, bool alone, 
   trust.blocks.push_back(block(error_histogram(rows)));
   if (partition.cv_folds > 0 && o == 0) {
     trust.blocks.push_back(block(error_over_leaves(partition)));
-    trust.blocks.push_back(kinds_table(partition, fitted.readable, p));
   }
   document.sections.push_back(std::move(trust));
 }
 
 }  // namespace
 
-Document fit_report(const Fitted& fitted) {
+Document fit_report(const Fitted& fitted, const Document& words) {
   Document document{.title = fmt::format("llmt fit {}", file_name(fitted.data)), .answer = ""};
   const std::vector<PartitionSummary>& partitions = fitted.result.summary.partitions;
   const bool alone = fitted.result.model.num_outputs() == 1;
   for (std::size_t p = 0; p < partitions.size(); ++p) {
     for (std::size_t o = 0; o < partitions[p].outputs.size(); ++o) add_output(fitted, p, o, alone, document);
   }
+  document.sections.push_back({"How it was made", "", {text_block("", words.notes)}});
+  document.sections.insert(document.sections.end(), words.sections.begin(), words.sections.end());
   return document;
 }
 

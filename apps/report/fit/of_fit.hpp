@@ -24,6 +24,7 @@ struct Fitted {
   Eigen::Index left_out = 0;  ///< rows that Loss::tukey left out; they are not among the inputs and outputs
 };
 
-Document fit_report(const Fitted& fitted);
+/// Charts, and below them what the terminal shows. `words`: see fit_words().
+Document fit_report(const Fitted& fitted, const Document& words);
 
 }  // namespace llmt::report

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "llmt/size.hpp"
+#include "report/fit/fit_summary.hpp"
 
 namespace llmt::report {
 namespace {
@@ -38,13 +39,13 @@ std::string note_on(const ReadablePartition& simple, const std::string& of, doub
   if (simple.is_within_loss) {
     return fmt::format(
         "The readable tree{} is the smallest one whose held-out RMSE is at most {:g} % above that of the best crisp "
-        "tree ({}).\n",
+        "tree ({}).",
         of, 100.0 * loss, best);
   }
   const std::string none = fmt::format("No short tree{} came within {:g} % of {}", of, 100.0 * loss, best);
   const double above = 100.0 * (simple.rmse / simple.best_crisp - 1.0);
-  return std::isfinite(above) ? fmt::format("{}; this one is {} % above.\n", none, number(above, above < 100.0 ? 2 : 3))
-                              : fmt::format("{}; this one has {}.\n", none, number(simple.rmse));
+  return std::isfinite(above) ? fmt::format("{}; this one is {} % above.", none, number(above, above < 100.0 ? 2 : 3))
+                              : fmt::format("{}; this one has {}.", none, number(simple.rmse));
 }
 
 std::string count(Eigen::Index value) { return fmt::format("{}", value); }
@@ -69,27 +70,31 @@ Json readable_json(const ReadableResult& readable) {
   return json;
 }
 
-std::string readable_text(const FitResult& fitted, const ReadableResult& readable, double loss, std::size_t width) {
-  Table table({"target", "model", "leaves", "terms per leaf", "size", "RMSE held-out", "spread of folds"});
-  std::string notes;
+Section readable_words(const FitResult& fitted, const ReadableResult& readable, double loss) {
+  Grid table{.header = {"target", "model", "leaves", "terms per leaf", "size", "RMSE held-out", "spread of folds"},
+             .rows = {},
+             .words = {1},
+             .wide = true};
+  std::vector<std::string> notes = {"Size: operators, constants and variables of the model as an expression."};
   for (std::size_t p = 0; p < readable.partitions.size(); ++p) {
     const ReadablePartition& simple = readable.partitions[p];
     const PartitionSummary& full = fitted.summary.partitions[p];
     const Model whole = part_of(fitted.model, p);
     const std::string& target = fitted.model.outputs()[simple.outputs.front()].name;
-    table.add({target, "as chosen above", count(full.leaves), count(most_terms(whole.partitions()[0])),
-               count(expression_size(whole)), number(full.chosen.rmse),
-               spread_text(full.chosen.spread, full.cv_folds)});
-    table.add({"", "readable", count(simple.leaves), count(simple.most_terms), count(simple.size), number(simple.rmse),
-               spread_text(simple.spread, full.cv_folds)});
+    const auto add = [&](const std::string& name, const std::string& model, Eigen::Index leaves, Eigen::Index terms,
+                         Eigen::Index size, double rmse, double spread) {
+      table.rows.push_back(
+          {name, model, count(leaves), count(terms), count(size), number(rmse), spread_text(spread, full.cv_folds)});
+    };
+    add(target, "as chosen above", full.leaves, most_terms(whole.partitions()[0]), expression_size(whole),
+        full.chosen.rmse, full.chosen.spread);
+    add("", "readable", simple.leaves, simple.most_terms, simple.size, simple.rmse, simple.spread);
     const CandidateError& linear = full.best_of_kind.front();
     const Model root = whole.prefix(1);
-    table.add({"", "least squares", "1", count(most_terms(root.partitions()[0])), count(expression_size(root)),
-               number(linear.rmse), spread_text(linear.spread, full.cv_folds)});
-    notes += note_on(simple, readable.partitions.size() > 1 ? " of " + target : "", loss);
+    add("", "least squares", 1, most_terms(root.partitions()[0]), expression_size(root), linear.rmse, linear.spread);
+    notes.push_back(note_on(simple, readable.partitions.size() > 1 ? " of " + target : "", loss));
   }
-  return fmt::format("\n{}Size: operators, constants and variables of the model as an expression.\n{}",
-                     table.text(width), notes);
+  return {"What reading costs", "", {block(table), text_block("", notes)}};
 }
 
 }  // namespace llmt::report

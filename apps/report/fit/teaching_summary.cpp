@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "report/text/text.hpp"
+
 namespace llmt::report {
 namespace {
 
@@ -28,22 +30,21 @@ Json teaching_json(const TaughtResult& taught) {
   return json;
 }
 
-std::string teaching_text(const TaughtResult& taught, std::size_t width) {
-  std::string text;
+Section teaching_words(const TaughtResult& taught) {
+  std::vector<std::string> lines;
   for (const TaughtPartition& errors : taught.partitions) {
     const std::string of = taught.partitions.size() > 1
                                ? fmt::format(" of {}", taught.fit.model.outputs()[errors.outputs.front()].name)
                                : "";
-    text += fmt::format("RMSE held-out{}: one tree {}, taught tree {}, sum {}: {}.\n", of, number(errors.alone),
-                        number(errors.taught), number(errors.teacher), kept_text(errors));
+    lines.push_back(fmt::format("RMSE held-out{}: one tree {}, taught tree {}, sum {}: {}.", of, number(errors.alone),
+                                number(errors.taught), number(errors.teacher), kept_text(errors)));
   }
-  text += taught.is_taken
-              ? fmt::format(
-                    "The model is the taught tree. A sum of trees answered for its rows and for {} "
-                    "that were made of them; none of them had a part in the held-out errors.\n",
-                    taught.made_rows)
-              : std::string("The model is the tree fitted to the data, because the taught tree is no better.\n");
-  return "\n" + wrapped(text, width);
+  lines.push_back(taught.is_taken
+                      ? fmt::format("The model is the taught tree. A sum of trees answered for its rows and for {} "
+                                    "that were made of them; none of them had a part in the held-out errors.",
+                                    taught.made_rows)
+                      : "The model is the tree fitted to the data, because the taught tree is no better.");
+  return {"What a teacher brought", "", {text_block("", lines)}};
 }
 
 }  // namespace llmt::report

@@ -1,18 +1,15 @@
 /// \file
-/// What a teacher brought a tree, as text and as JSON.
+/// What a teacher brought a tree, in words and as JSON.
 #pragma once
 
-#include <string>
-
 #include "llmt/teach.hpp"
-#include "report/text/json.hpp"
-#include "report/text/text.hpp"
+#include "report/document/document.hpp"
 
 namespace llmt::report {
 
 Json teaching_json(const TaughtResult& taught);
 
-/// "One tree 5.00, taught tree 4.70, sum 4.01", and what it means. `width`: of lines.
-std::string teaching_text(const TaughtResult& taught, std::size_t width = no_width_limit);
+/// "One tree 5.00, taught tree 4.70, sum 4.01", and what it means.
+Section teaching_words(const TaughtResult& taught);
 
 }  // namespace llmt::report

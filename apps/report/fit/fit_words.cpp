@@ -13,6 +13,8 @@
 namespace llmt::report {
 namespace {
 
+using Lines = std::vector<std::string>;
+
 // "RD (the default)".
 std::string title_with_default(GrowthRule rule) {
   return std::string(title_of(rule)) + (rule == FitOptions().rule ? " (the default)" : "");
@@ -29,32 +31,28 @@ std::string selection_text(const FitRun& run, const PartitionSummary& partition)
 }
 
 // What the local models are made of, and what spoke for it; nothing for what was not asked.
-std::string local_models_text(const FitRun& run, const FitSummary& summary) {
+void add_local_models(const FitRun& run, const FitSummary& summary, Lines& lines) {
   const FitOptions& asked = run.options;
-  std::string text;
   if (asked.terms != LocalTerms::linear) {
-    text += fmt::format("Local models are {}", summary.quadratic ? "quadratic" : "linear");
+    std::string text = fmt::format("Local models are {}", summary.quadratic ? "quadratic" : "linear");
     for (std::size_t p = 0; p < summary.other_terms.size(); ++p) {
       text += fmt::format("{} RMSE held-out {}",
                           p == 0 ? fmt::format("; {} ones:", summary.quadratic ? "linear" : "quadratic") : ",",
                           number(summary.other_terms[p].rmse));
     }
-    text += asked.terms == LocalTerms::automatic && summary.other_terms.empty()
-                ? ", without a comparison: it needs folds and 1 to 13 numeric regression inputs.\n"
-                : ".\n";
+    lines.push_back(text + (asked.terms == LocalTerms::automatic && summary.other_terms.empty()
+                                ? ", without a comparison: it needs folds and 1 to 13 numeric regression inputs."
+                                : "."));
   }
   for (const PartitionSummary& partition : summary.partitions) {
-    if (partition.chosen.candidate.sparse) {
-      text +=
-          fmt::format("Sparse local models: {} coefficients in {} leaves.\n", partition.coefficients, partition.leaves);
-    }
+    if (!partition.chosen.candidate.sparse) continue;
+    lines.push_back(
+        fmt::format("Sparse local models: {} coefficients in {} leaves.", partition.coefficients, partition.leaves));
   }
-  return text;
 }
 
 // Which inputs the partitions do not use, and what that gained; nothing for those that use all.
-std::string left_out_text(const FitResult& result) {
-  std::string text;
+void add_left_out(const FitResult& result, Lines& lines) {
   for (const PartitionSummary& partition : result.summary.partitions) {
     if (partition.left_out.empty()) continue;
     const std::vector<InputStep>& steps = partition.input_steps;
@@ -63,57 +61,55 @@ std::string left_out_text(const FitResult& result) {
     const std::string target = result.summary.partitions.size() == 1
                                    ? ""
                                    : fmt::format(" of {}", result.model.outputs()[partition.outputs[0]].name);
-    text += fmt::format(
+    lines.push_back(fmt::format(
         "Inputs left out{}: {} of {} ({}); in a quick comparison held-out RMSE was {} with all inputs, {} without "
-        "these.\n",
+        "these.",
         target, partition.left_out.size(), result.model.num_inputs(),
-        first_names(names_of(result.model, partition.left_out)), number(steps.front().rmse), number(chosen->rmse));
+        first_names(names_of(result.model, partition.left_out)), number(steps.front().rmse), number(chosen->rmse)));
   }
-  return text;
 }
 
 // Which inputs are codes, and what that gained; nothing if none is.
-std::string codes_text(const FitResult& result) {
+void add_codes(const FitResult& result, Lines& lines) {
   const CodeChoice& codes = result.summary.codes;
-  if (codes.taken.empty()) return "";
-  return fmt::format(
+  if (codes.taken.empty()) return;
+  lines.push_back(fmt::format(
       "Numbers taken for codes, that is for categories: {}; in a quick comparison held-out RMSE was {}{} as numbers, "
-      "{} "
-      "as codes.\n",
+      "{} as codes.",
       fmt::join(names_of(result.model, codes.taken), ", "), result.summary.partitions.size() > 1 ? "relative, " : "",
-      number(codes.rmse_as_numbers), number(codes.rmse_as_codes));
+      number(codes.rmse_as_numbers), number(codes.rmse_as_codes)));
 }
 
 // Of the outputs that are clamped, between what, and what that gained.
-std::string range_text(const Model& model, const PartitionSummary& summary, const Partition& partition) {
-  std::string text;
+void add_ranges(const Model& model, const PartitionSummary& summary, const Partition& partition, Lines& lines) {
   for (std::size_t o = 0; o < summary.range_guards.size(); ++o) {
-    if (const RangeGuard& guard = summary.range_guards[o]; guard.taken) {
-      text += fmt::format("{} is kept between {} and {}, the range of the training rows: RMSE held-out {} -> {}.\n",
-                          model.outputs()[summary.outputs[o]].name,
-                          number(partition.output_range(static_cast<Eigen::Index>(o), 0)),
-                          number(partition.output_range(static_cast<Eigen::Index>(o), 1)), number(guard.rmse_without),
-                          number(guard.rmse_with));
-    }
+    const RangeGuard& guard = summary.range_guards[o];
+    if (!guard.taken) continue;
+    const auto bound = [&](Eigen::Index side) {
+      return number(partition.output_range(static_cast<Eigen::Index>(o), side));
+    };
+    lines.push_back(fmt::format("{} is kept between {} and {}, the range of the training rows: RMSE held-out {} -> {}.",
+                                model.outputs()[summary.outputs[o]].name, bound(0), bound(1),
+                                number(guard.rmse_without), number(guard.rmse_with)));
   }
-  return text;
 }
 
 // How the splits of the final tree were searched, if not all were compared.
-std::string search_text(const SearchSummary& search) {
-  if (search.binned_nodes == 0) return "";
-  return fmt::format(
+void add_search(const SearchSummary& search, Lines& lines) {
+  if (search.binned_nodes == 0) return;
+  lines.push_back(fmt::format(
       "Thresholds of splits: in {} node{} of many rows the best one between groups of neighbouring values, in {} small "
-      "one{} the best of all. {}\n",
+      "one{} the best of all. {}",
       search.binned_nodes, search.binned_nodes == 1 ? "" : "s", search.exact_nodes, search.exact_nodes == 1 ? "" : "s",
       search.largest_excess > 0.0
           ? fmt::format("A threshold within a group would lower a node's sum of squared errors by at most {} % more; "
                         "--search exact looks for it.",
                         number(100.0 * search.largest_excess, 2))
-          : "No threshold within a group is better.");
+          : "No threshold within a group is better."));
 }
 
-std::string data_text(const FitRun& run, const FitResult& result) {
+// What was read, and what is to be known of its rows.
+void add_data(const FitRun& run, const FitResult& result, Document& words) {
   std::vector<std::string> inputs;
   std::vector<std::string> constant;
   for (const InputColumn& input : result.model.inputs()) {
@@ -123,54 +119,55 @@ std::string data_text(const FitRun& run, const FitResult& result) {
       constant.push_back(input.name);
     }
   }
-  std::string text = fmt::format("{}: {} rows, {} input{}: {}\n", run.data, result.summary.samples, inputs.size(),
-                                 inputs.size() == 1 ? "" : "s", first_names(inputs));
+  words.subject = fmt::format("{}: {} rows, {} input{}: {}", run.data, result.summary.samples, inputs.size(),
+                              inputs.size() == 1 ? "" : "s", first_names(inputs));
   if (result.summary.repeats) {
-    text += "Rows with equal inputs are taken for repeats of one measurement, and are held out together\n";
+    words.notes.push_back("Rows with equal inputs are taken for repeats of one measurement, and are held out together");
   }
   if (result.summary.copies > 0) {
-    text += fmt::format("Copies of other rows: {}; they only add to the weight of the rows that they copy\n",
-                        result.summary.copies);
+    words.notes.push_back(fmt::format(
+        "Copies of other rows: {}; they only add to the weight of the rows that they copy", result.summary.copies));
   }
   if (result.summary.missing_values > 0) {
-    text += fmt::format("Missing values in the inputs: {}\n", result.summary.missing_values);
+    words.notes.push_back(fmt::format("Missing values in the inputs: {}", result.summary.missing_values));
   }
   if (run.options.loss == Loss::tukey) {
     const std::vector<Eigen::Index> rows = rows_left_out(result.summary.loss_weights, run.rows.weights);
     const auto lacks_input = [&](Eigen::Index row) { return run.rows.inputs.row(row).hasNaN(); };
     const auto lacking = std::ranges::count_if(rows, lacks_input);
-    text += left_out_by_loss(lines_at(run.lines, rows), result.summary.samples + std::ssize(rows));
+    words.notes.push_back(left_out_by_loss(lines_at(run.lines, rows), result.summary.samples + std::ssize(rows)));
     if (2 * lacking > std::ssize(rows)) {
-      text += fmt::format(
-          "{} of these have empty cells in inputs: the errors below, and intervals, hold for rows without "
-          "empty cells\n",
-          lacking);
+      words.notes.push_back(fmt::format(
+          "{} of these have empty cells in inputs: the errors below, and intervals, hold for rows without empty cells",
+          lacking));
     }
   }
   if (!constant.empty()) {
-    text += fmt::format("Constant, so without influence: {}\n", first_names(constant));
+    words.notes.push_back(fmt::format("Constant, so without influence: {}", first_names(constant)));
   }
-  return text;
 }
 
 // The chosen model of every target, and below it the best of the other kinds.
-Table models_table(const FitResult& result) {
-  Table table({"target", "model", "leaves", "RMSE held-out", "spread of folds", "RMSE in-sample"});
+Json models_table(const FitResult& result) {
+  Grid table{.header = {"target", "model", "leaves", "RMSE held-out", "spread of folds", "RMSE in-sample"},
+             .rows = {},
+             .words = {1},
+             .wide = true};
   for (const PartitionSummary& partition : result.summary.partitions) {
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
       const std::string& target = result.model.outputs()[partition.outputs[o]].name;
       const CandidateError& chosen = partition.chosen;
-      table.add({target, kind_of(chosen.candidate), fmt::format("{}", partition.leaves), number(chosen.rmse),
-                 spread_text(chosen.spread, partition.cv_folds), number(partition.train_rmse(o))});
+      table.rows.push_back({target, kind_of(chosen.candidate), fmt::format("{}", partition.leaves), number(chosen.rmse),
+                            spread_text(chosen.spread, partition.cv_folds), number(partition.train_rmse(o))});
       if (o > 0) continue;
       const std::vector<CandidateError> kinds = best_of_kinds(partition);
       for (const CandidateError& other : std::span(kinds).subspan(1)) {
-        table.add({"  against", kind_of(other.candidate), fmt::format("{}", other.candidate.leaves), number(other.rmse),
-                   spread_text(other.spread, partition.cv_folds), ""});
+        table.rows.push_back({"  against", kind_of(other.candidate), fmt::format("{}", other.candidate.leaves),
+                              number(other.rmse), spread_text(other.spread, partition.cv_folds), ""});
       }
     }
   }
-  return table;
+  return block(table);
 }
 
 }  // namespace
@@ -187,9 +184,9 @@ std::string left_out_by_loss(std::vector<Eigen::Index> lines, Eigen::Index rows)
   constexpr std::size_t most_named = 10;
   const std::size_t count = lines.size();
   std::string text = fmt::format("Rows left out by the Tukey loss: {} of {}", count, rows);
-  if (count == 0) return text + "\n";
+  if (count == 0) return text;
   lines.resize(std::min(count, most_named));
-  return text + fmt::format(" ({} {}{}); the errors below are those of the other rows\n", count == 1 ? "line" : "lines",
+  return text + fmt::format(" ({} {}{}); the errors below are those of the other rows", count == 1 ? "line" : "lines",
                             fmt::join(lines, ", "), count > lines.size() ? ", ..." : "");
 }
 
@@ -212,32 +209,35 @@ std::vector<Eigen::Index> lines_at(const std::vector<Eigen::Index>& lines, const
   return chosen;
 }
 
-std::string fit_text(const FitRun& run, const FitResult& result, std::size_t width) {
+Document fit_words(const FitRun& run, const FitResult& result) {
   const std::vector<PartitionSummary>& partitions = result.summary.partitions;
-  std::string text = data_text(run, result);
-  text += fmt::format("Tree grown by {}, at least {} rows in a leaf; {}\n\n", title_with_default(run.options.rule),
-                      result.summary.min_leaf_samples, selection_text(run, partitions.front()));
-  text += models_table(result).text(width);
+  Document words{.title = "", .answer = ""};
+  add_data(run, result, words);
+  words.notes.push_back(fmt::format("Tree grown by {}, at least {} rows in a leaf; {}",
+                                    title_with_default(run.options.rule), result.summary.min_leaf_samples,
+                                    selection_text(run, partitions.front())));
+  Lines lines;
   const auto has_better = [](const PartitionSummary& partition) {
     return std::ranges::any_of(best_of_kinds(partition),
                                [&](const CandidateError& other) { return other.rmse < partition.chosen.rmse; });
   };
   if (std::ranges::any_of(partitions, has_better)) {
-    text += "A model with a smaller error is not better by more than chance; the simpler one was taken.\n";
+    lines.push_back("A model with a smaller error is not better by more than chance; the simpler one was taken.");
   }
   if (partitions.front().outputs.size() > 1) {
-    text += "Held-out errors of the shared tree are over all targets, each divided by its standard deviation.\n";
+    lines.push_back("Held-out errors of the shared tree are over all targets, each divided by its standard deviation.");
   }
-  text += codes_text(result) + left_out_text(result);
+  add_codes(result, lines);
+  add_left_out(result, lines);
   for (std::size_t p = 0; p < partitions.size(); ++p) {
-    text += range_text(result.model, partitions[p], result.model.partitions()[p]);
+    add_ranges(result.model, partitions[p], result.model.partitions()[p], lines);
   }
-  text += local_models_text(run, result.summary);
-  for (const PartitionSummary& partition : partitions) {
-    text += search_text(partition.search);
-  }
-  if (!run.output.empty()) text += fmt::format("Model written to {}\n", run.output);
-  return text;
+  add_local_models(run, result.summary, lines);
+  for (const PartitionSummary& partition : partitions) add_search(partition.search, lines);
+  if (!run.output.empty()) lines.push_back(fmt::format("Model written to {}", run.output));
+  words.sections.push_back({"What was compared", "", {models_table(result)}});
+  if (!lines.empty()) words.sections.back().blocks.push_back(text_block("", lines));
+  return words;
 }
 
 }  // namespace llmt::report
