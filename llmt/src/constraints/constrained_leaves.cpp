@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "constraints/monotone_splits.hpp"
-#include "constraints/ordered_splits.hpp"
 #include "constraints/signs.hpp"
 #include "numerics/bounded_least_squares.hpp"
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <stdexcept>
 
 #include "base/memory.hpp"
 #include "csv/cells.hpp"

@@ -5,7 +5,6 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
-#include <vector>
 
 #include "base/sum_over.hpp"
 #include "llmt/statistics.hpp"

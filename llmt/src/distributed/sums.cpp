@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <iterator>
-#include <limits>
 #include <stdexcept>
 
 #include "distributed/block_sums.hpp"

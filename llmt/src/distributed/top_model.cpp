@@ -1,14 +1,12 @@
 #include "distributed/top_model.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <utility>
 #include <vector>
 
 #include "estimation/estimate.hpp"
 #include "estimation/leaf_statistics.hpp"
-#include "llmt/model.hpp"
 #include "numerics/gram.hpp"
 #include "stream/sums.hpp"
 

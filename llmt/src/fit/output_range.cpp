@@ -1,7 +1,6 @@
 #include "fit/output_range.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <tuple>
 

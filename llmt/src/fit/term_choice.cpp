@@ -1,7 +1,6 @@
 #include "fit/term_choice.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "data/regressors.hpp"
 #include "fit/trees/held_out_error.hpp"

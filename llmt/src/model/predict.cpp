@@ -1,6 +1,5 @@
 // What a model says of rows: predictions, derivatives, leaves, and how far to trust them.
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "base/checks.hpp"

@@ -1,5 +1,4 @@
 // Boosted models as JSON: docs/file-formats.md.
-#include <stdexcept>
 
 #include "boosted/model/boosted_checks.hpp"
 #include "llmt/boosted_model.hpp"

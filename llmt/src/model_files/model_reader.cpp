@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <limits>
-#include <stdexcept>
 
 #include "llmt/files.hpp"
 #include "llmt/model.hpp"

@@ -1,4 +1,3 @@
-#include <cmath>
 
 #include "partition/evaluator.hpp"
 #include "partition/logistic.hpp"

@@ -1,7 +1,5 @@
 #include "partition/leverage.hpp"
 
-#include <algorithm>
-
 #include "base/simd.hpp"
 #include "partition/imputed.hpp"
 

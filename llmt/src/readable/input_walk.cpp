@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "base/count.hpp"
 #include "data/fewer_inputs.hpp"

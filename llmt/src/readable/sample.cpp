@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "partition/local_models.hpp"
 #include "readable/decimal.hpp"

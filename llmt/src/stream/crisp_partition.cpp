@@ -6,7 +6,6 @@
 #include "base/count.hpp"
 #include "estimation/estimate.hpp"
 #include "estimation/leaf_statistics.hpp"
-#include "stream/setting.hpp"
 
 namespace llmt {
 namespace {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/matrix.hpp"
 #include "stream/sums.hpp"
 
 namespace llmt {

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "numerics/f_distribution.hpp"
-#include "stream/setting.hpp"
 
 namespace llmt {
 namespace {

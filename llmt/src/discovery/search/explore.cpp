@@ -1,7 +1,6 @@
 #include "discovery/search/explore.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 
 namespace llmt::discovery {

@@ -12,7 +12,6 @@
 #include "estimation/sums/active_rows.hpp"
 #include "estimation/sums/missing_by_validity.hpp"
 #include "estimation/sums/rows_by_leaf.hpp"
-#include "partition/evaluator.hpp"
 
 namespace llmt {
 namespace {

@@ -1,7 +1,6 @@
 #include "growth/best_first/best_first.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <optional>
 #include <queue>

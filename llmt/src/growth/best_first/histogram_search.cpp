@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <limits>
-#include <numeric>
 
 #include "base/parallel.hpp"
 #include "growth/best_first/histogram.hpp"
