@@ -98,14 +98,14 @@ def report(checkout, shown):
             print(f"   {checkout.name(path)}:{line}")
 
 
-def main():
+def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("checkout", nargs="?", default=".")
     parser.add_argument("--places", choices=MEASURES)
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--renew", action="store_true")
     parser.add_argument("--table", type=pathlib.Path, help="another table")
-    given = parser.parse_args()
+    given = parser.parse_args(arguments)
     checkout = Checkout(given.checkout)
     if not (given.check or given.renew):
         report(checkout, given.places)

@@ -1,12 +1,18 @@
 """measures_test.py CHECKOUT: every room has the figures of table.md, and a rise or fall of each measure is noticed."""
 
+import contextlib
+import io
 import pathlib
-import subprocess
 import sys
 import tempfile
+import types
 import unittest
 
 root = pathlib.Path(sys.argv.pop())
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(root / "bench/code"))
+
+import measure_code
 
 OPTIONS = "llmt/include/llmt/options.hpp"
 NAMES = ["max_leaves", "min_leaf_samples", "loss", "sparse", "terms"]
@@ -42,8 +48,9 @@ class Measures(unittest.TestCase):
         self.write(name, START.get(name, "") + text)
 
     def run_script(self, what, checkout=None):
-        command = [sys.executable, root / "bench/code/measure_code.py", what, checkout or self.checkout]
-        return subprocess.run(command, capture_output=True, text=True)
+        with contextlib.redirect_stderr(io.StringIO()) as words:
+            code = measure_code.main([what, str(checkout or self.checkout)])
+        return types.SimpleNamespace(returncode=code, stderr=words.getvalue())
 
     def refused(self, words):
         result = self.run_script("--check")

@@ -95,14 +95,13 @@ def python_modules(checkout, package="apps/python/llmt"):
         modules[parts[:-1] if parts[-1] == "__init__" else parts] = path
 
     def has(module, name):
-        tree = checkout.tree(modules[module])
         return any(name in (getattr(node, "id", None), getattr(node, "asname", None), getattr(node, "name", None))
-                   for node in ast.walk(tree))
+                   for node in checkout.nodes(modules[module]))
 
     edges = {}
     for parts, path in modules.items():
         reached = set()
-        for node in ast.walk(checkout.tree(path)):
+        for node in checkout.nodes(path):
             if isinstance(node, ast.Import):
                 reached |= {tuple(alias.name.split(".")) for alias in node.names}
             elif isinstance(node, ast.ImportFrom):

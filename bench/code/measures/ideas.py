@@ -31,7 +31,7 @@ def answers(checkout, members):
     places = [(path, line_of(checkout.code(path), match.start()))
               for path in checkout.cpp() for match in assigned.finditer(checkout.code(path))]
     for path in checkout.python():
-        for node in ast.walk(checkout.tree(path)):
+        for node in checkout.nodes(path):
             is_member = isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store) and node.attr in members
             if is_member or isinstance(node, ast.keyword) and node.arg in members:
                 places.append((path, node.lineno if is_member else node.value.lineno))

@@ -59,7 +59,7 @@ def _named(checkout, path, fields):
 def _parameters(checkout):
     path = checkout.root / _ESTIMATOR
     names = set()
-    for node in ast.walk(checkout.tree(path)) if path.is_file() else ():
+    for node in checkout.nodes(path) if path.is_file() else ():
         if isinstance(node, ast.FunctionDef) and node.name == "__init__":
             names |= {argument.arg for argument in node.args.kwonlyargs}
     return names
@@ -91,7 +91,7 @@ def lists(checkout):
     known = fields | _parameters(checkout)
     for path in checkout.python():
         lines = []
-        for node in ast.walk(checkout.tree(path)):
+        for node in checkout.nodes(path):
             if isinstance(node, (ast.Dict, ast.List, ast.Tuple, ast.Set)):
                 keys = node.keys if isinstance(node, ast.Dict) else node.elts
                 named = {key.value for key in keys if isinstance(key, ast.Constant)} & known

@@ -47,9 +47,10 @@ class Checkout:
 
         return _COMMENT_OR_TEXT.sub(blank, self.text(path))
 
+    # All nodes of the syntax tree of a file of Python, its module first.
     @functools.lru_cache(maxsize=None)
-    def tree(self, path):
-        return ast.parse(self.text(path))
+    def nodes(self, path):
+        return list(ast.walk(ast.parse(self.text(path))))
 
     def cpp(self):
         return self.files(*MEASURED)

@@ -1,6 +1,7 @@
 """Thresholds: numbers that decide, whether they have a name or stand in a condition."""
 
 import ast
+import functools
 import re
 
 from .sources import line_of
@@ -39,6 +40,7 @@ def named(checkout, path):
     return found
 
 
+@functools.lru_cache(maxsize=None)
 def conditions(checkout, path):
     """(text, position) of every comparison, and of the arguments of std::min, std::max and std::clamp."""
     code = _LOOP.sub(lambda loop: " " * len(loop.group()), checkout.code(path))
@@ -65,13 +67,13 @@ def _of_python(checkout, path):
         return (isinstance(node, ast.Constant) and type(node.value) in (int, float) and abs(node.value) not in _PLAIN)
 
     lines = []
-    for node in ast.walk(checkout.tree(path)):
+    for node in checkout.nodes(path):
         if isinstance(node, ast.Compare):
             sides = [node.left, *node.comparators]
             sides += [side.operand for side in sides if isinstance(side, ast.UnaryOp)]
             sides += [part for side in sides if isinstance(side, ast.BinOp) for part in (side.left, side.right)]
             lines += [side.lineno for side in sides if number(side)]
-    for node in checkout.tree(path).body:
+    for node in checkout.nodes(path)[0].body:
         value = getattr(getattr(node, "value", None), "value", None)
         if isinstance(node, (ast.Assign, ast.AnnAssign)) and type(value) in (int, float):
             lines.append(node.lineno)
