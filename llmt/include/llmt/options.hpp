@@ -177,7 +177,7 @@ struct FitOptions {
 
 /// The default of an option whose default depends on the case, in words: "1 where blends or Gaussians are candidates;
 /// ...; else 0.05". `option`: "max_leaves", "min_leaf_samples", "significance", "widths", "jumps", "ridges" or
-/// "shrinkages"; throws std::invalid_argument for others. docs/commands.md has these texts too.
+/// "shrinkages"; throws std::invalid_argument for others. docs/options.md has these texts too.
 std::string default_text(std::string_view option);
 
 /// A rule's name for people: "LOLIMOT with thresholds from the data". Throws as summary_of().
