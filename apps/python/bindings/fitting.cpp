@@ -125,12 +125,6 @@ class Fit {
         report::fit_report({data, rows.inputs, rows.outputs, options_, *result_, shown, 0}, words(data)), origin);
   }
 
-  std::string document(const std::string& data) const {
-    const TrainingData& rows = prepared_->data();
-    const report::Fitted fitted{data, rows.inputs, rows.outputs, options_, *result_, readable_, 0};
-    return report::to_json(report::fit_report(fitted, words(data))).dump();
-  }
-
  private:
   report::FitRun run(const std::string& data) const { return {data, options_, prepared_->data(), lines_, ""}; }
 
@@ -235,8 +229,7 @@ void add_fitting(nb::module_& module) {
       .def("loss_weights", &Fit::loss_weights)
       .def("held_out_predictions", &Fit::held_out_predictions, nb::arg("output"))
       .def("gross_errors", &Fit::gross_errors, nb::arg("output"))
-      .def("page", &Fit::page, nb::arg("data"), nb::arg("origin"))
-      .def("document", &Fit::document, nb::arg("data"));
+      .def("page", &Fit::page, nb::arg("data"), nb::arg("origin"));
   module.def("fit", &fit_table, nb::arg("inputs"), nb::arg("outputs"), nb::arg("options"), nb::kw_only(),
              nb::arg("input_names"), nb::arg("output_names"), nb::arg("levels"), nb::arg("weights") = nb::none(),
              nb::arg("groups") = nb::none(), nb::arg("held_out") = std::vector<Eigen::Index>(),
