@@ -1,6 +1,7 @@
 #include "discovery/search/explore.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 namespace llmt::discovery {
