@@ -180,7 +180,7 @@ void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& argumen
   columns.inputs = std::ssize(columns.names);
   columns.names.push_back(learning.targets.front());
   distributed::Options options{
-      .weighted = !learning.weight.empty(), .may_have_codes = learning.may_have_codes, .fit = learning.options};
+      .weighted = !learning.weight.empty(), .fit = learning.options, .may_have_codes = learning.may_have_codes};
   if (options.weighted) columns.names.push_back(learning.weight);
   const std::vector<std::string> inputs(columns.names.begin(), columns.names.begin() + columns.inputs);
   table.require_numbers({columns.names.begin() + columns.inputs, columns.names.end()});
