@@ -150,8 +150,8 @@ void for_each_field(Options& options, Visitor&& visit) {
   visit(OptionField{"loss", "--loss", "loss",
                     "What is made small: squares of the residuals, or squares with rows far from a preliminary tree "
                     "left out (Tukey's biweight)",
-                    no_number, false, everyone, true,
-                    Use::refused("take the squared loss; medians over all rows are no sums"), no, no},
+                    no_number, false, everyone, true, Use::refused("take squares; medians over all rows are no sums"),
+                    no, no},
         loss);
   visit(OptionField{"rule", "--rule", "rule", "Growth rule", no_number, false, experts, false,
                     Use::refused("take rd, or fit a sample that fits into memory"), no, no},
@@ -164,7 +164,7 @@ void for_each_field(Options& options, Visitor&& visit) {
                     "Search for splits: exact; by bins, exact in small nodes and where bins may hold a better split; "
                     "or bins for many rows",
                     no_number, false, experts, false,
-                    Use::taken_but("exact", "the top of the tree is searched by bins"), no, no},
+                    Use::taken_but("exact", "take auto or binned; the top of the tree is searched by bins"), no, no},
         search);
   visit(OptionField{"shared_partition", "--shared", "shared_tree", "One tree for all targets instead of one each",
                     no_number, false, experts, false, taken, no, no},
