@@ -21,6 +21,7 @@
 #include "llmt/intervals.hpp"
 #include "llmt/model.hpp"
 #include "llmt/names.hpp"
+#include "llmt/option_fields.hpp"
 #include "llmt/options.hpp"
 #include "llmt/outliers.hpp"
 #include "llmt/partition.hpp"

@@ -94,7 +94,7 @@ struct OptionField {
 template <class Options, class Visitor>
 requires std::is_same_v<std::remove_const_t<Options>, FitOptions>
 void for_each_field(Options& options, Visitor&& visit) {
-  // A member without a name here does not compile, and one that is not visited is an unused name, which fails a test.
+  // A member without a name here does not compile. That every name is visited is checked by a test, KeptOptions.
   auto& [rule, max_leaves, min_leaf_samples, significance, split_inputs, regression_inputs, choose_inputs,
          shared_partition, pruning, validity, terms, loss, sparse, folds, trends, intervals, max_threads, expert] =
       options;
@@ -263,7 +263,6 @@ bool means_the_same(const Value& one, const Value& other) {
 template <class Options>
 void require_taken(const Options& options, const WayOfFitting& way) {
   const Options defaults{};
-  std::vector<std::string> refusals;
   for_each_field(options, [&](const auto& field, const auto& value) {
     const Use& use = field.*way.use;
     std::string choice;
