@@ -11,8 +11,8 @@
 #include "report/document/document_text.hpp"
 #include "report/document/figures.hpp"
 #include "report/document/page.hpp"
+#include "report/fit/comparison.hpp"
 #include "report/fit/fit_summary.hpp"
-#include "report/fit/of_comparison.hpp"
 #include "report/fit/of_fit.hpp"
 #include "report/model/leaves.hpp"
 #include "report/model/rule_text.hpp"
@@ -49,7 +49,10 @@ Document report_of(const Sample& table, llmt::FitOptions options = {}) {
   options.intervals = true;
   const llmt::FitResult result = llmt::fit(table.inputs, table.outputs, options);
   const std::optional<llmt::ReadableResult> none;
-  return fit_report({"folder/table.csv", table.inputs, table.outputs, options, result, none});
+  const std::vector<Eigen::Index> lines(table.inputs.rows(), 2);
+  const llmt::TrainingData data{table.inputs, table.outputs};
+  return fit_report({"folder/table.csv", table.inputs, table.outputs, options, result, none},
+                    fit_words({"folder/table.csv", options, data, lines, ""}, result));
 }
 
 TEST(Report, HostileNamesStayData) {
@@ -105,6 +108,11 @@ TEST(Report, FitShowsEveryRowByAModelThatHadNotSeenIt) {
   }
   EXPECT_EQ(trees, 1);
   EXPECT_EQ(maps, 1);  // two inputs: the boxes
+  // Below the charts the page says what the terminal says.
+  const std::string text = document_text(document);
+  EXPECT_NE(text.find("\ntarget     model"), std::string::npos) << text;
+  EXPECT_NE(text.find("\nTree grown by RD (the default), at least "), std::string::npos) << text;
+  EXPECT_EQ(page.dump().find("folder"), std::string::npos);
 }
 
 TEST(Report, RowsThatTheLossLeftOutAreSaid) {
@@ -112,7 +120,7 @@ TEST(Report, RowsThatTheLossLeftOutAreSaid) {
   llmt::FitOptions options;
   const llmt::FitResult result = llmt::fit(table.inputs, table.outputs, options);
   const std::optional<llmt::ReadableResult> none;
-  const Document document = fit_report({"t.csv", table.inputs, table.outputs, options, result, none, 3});
+  const Document document = fit_report({"t.csv", table.inputs, table.outputs, options, result, none, 3}, {});
   EXPECT_NE(document.main->caption.find("3 rows that the Tukey loss left out are not shown."), std::string::npos);
   EXPECT_EQ(document.main->layers.front().name, "rows, without 3 left out");
   EXPECT_NE(document.lead.find("The Tukey loss left out 3 rows more."), std::string::npos) << document.lead;
@@ -137,8 +145,13 @@ TEST(Report, ComparisonMarksWhatIsRecommended) {
                                  {.method = "b", .fold_rmse = Eigen::Vector2d(1.0, 1.0), .cv_rmse = 1.0}},
                                 1,
                                 "Take b."};
-  const Document document = comparison_report({"t.csv", "y", 10, 2, result});
+  const Sample table = jumping(10);
+  const llmt::FitOptions options;
+  const std::vector<Eigen::Index> lines(10, 2);
+  const llmt::TrainingData data{table.inputs, table.outputs};
+  const Document document = comparison_report({"t.csv", options, data, lines, ""}, "y", result);
   EXPECT_EQ(document.answer, "Take b.");
+  EXPECT_EQ(document.lead, "t.csv: 10 rows, 2 inputs; y, 2 folds, every choice made inside the fold.");
   EXPECT_EQ(document.main->layers.front().roles[1], "model");
 }
 
@@ -150,7 +163,7 @@ TEST(FitSummary, ARuleWithoutAnEnumeratorHasItsTitle) {
   const std::vector<Eigen::Index> lines(200, 2);
   const llmt::TrainingData data{table.inputs, table.outputs};
   const FitRun run{"t.csv", options, data, lines, ""};
-  EXPECT_NE(fit_text(run, result).find("\nTree grown by Toy halves, at least "), std::string::npos);
+  EXPECT_NE(document_text(fit_words(run, result)).find("\nTree grown by Toy halves, at least "), std::string::npos);
   EXPECT_EQ(fit_json(run, result)["rule"], "toy");
 }
 
