@@ -31,8 +31,8 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
     Parameters
     ----------
     learning_rate : float or None, default=None
-        Factor on every tree, above 0 and at most 1. None: 0.05 below 10 000 rows, 0.07 up to 100 000, then 0.1; 0.1 where
-        the trees are soft.
+        Factor on every tree, above 0 and at most 1. None: 0.1 where the trees are soft, else 0.05 to
+        0.1 by the number of rows (docs/algorithms/boosting.md).
     max_iter : int, default=2000
         Most trees of a target, before the sum is fitted to all rows with a quarter more.
     categorical_features : sequence of str or int, default=()

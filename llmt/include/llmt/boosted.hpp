@@ -27,8 +27,7 @@ inline constexpr Eigen::Index fewest_boosted_rows = 10;
 inline constexpr int most_boosted_levels = 50;
 
 struct BoostOptions {
-  /// Factor on every tree. 0: 0.05 below 10 000 rows, 0.1 above 100 000 and where the trees are soft,
-  /// else 0.07.
+  /// Factor on every tree. 0: 0.1 where the trees are soft, else that of the table at fit_boosted().
   double rate = 0.0;
   int max_rounds = 2000;     ///< trees of an output at most, before the sum is fitted to all rows
   std::uint64_t seed = 1;    ///< of the rows that are held out, and of the features that a split looks at
@@ -48,8 +47,8 @@ void for_each_field(Options& options, Visitor&& visit) {
   visit("mean_of_few", mean_of_few);
 }
 
-/// A variant of the trees that was compared on held-out rows: with all its trees, or after 50 rounds. From 5000 rows on
-/// they are compared after 50 rounds. If one tree is tried then, the sum with all its trees and the one tree come last.
+/// A variant of the trees that was compared on held-out rows: with all its trees, or in a race after 50 rounds. If one
+/// tree is tried after a race, the sum with all its trees and the one tree come last.
 struct BoostVariant {
   std::string name;  ///< "symmetric", "free", "symmetric with pairs", "one tree", ...
   double rmse = 0.0;
@@ -74,14 +73,23 @@ struct BoostResult {
 
 /// Fits a sum of trees to each output.
 ///
-/// A fifth of the rows is held out, of more than 100 000 rows about 20 000, whole groups of them. They decide which
-/// trees are taken and when boosting stops. Then the sum is fitted to all rows with a quarter more trees, if more than
-/// a twentieth was held out. With TrainingData::held_out these rows decide instead, and the sum of the other rows is
-/// the result. Below 500 rows each fifth is held out in turn, and the sum is a weighted mean of two variants and one
-/// tree, as fit() makes it; its error is that of the whole procedure, shares and number of trees chosen without the
-/// row. From 500 rows on it is the mean of the sum and such a tree where the tree alone is better than the sum on the
-/// held-out rows. From 5000 to 50 000 rows, with at most 32 inputs, that is tried where boosting stops within 200
-/// rounds; with more rows, or more than 100 inputs, never.
+/// The number of rows decides how (docs/algorithms/boosting.md says what the columns are):
+///
+/// | rows from | rate | slopes | c | patience | held out | race | one tree | splits from |
+/// | --- | --- | --- | --- | --- | --- | --- | --- | --- |
+/// | 10 | 0.05 | 3 | 3 | 100 | each fifth in turn | no | RA, to 100 inputs | all rows |
+/// | 500 | 0.05 | 3 | 3 | 200 | a fifth | no | RA or RD, to 100 inputs | all rows |
+/// | 5000 | 0.05 | 5 | 1 | 50 | a fifth | yes | RA, to 32 inputs, 200 trees | all rows |
+/// | 10 000 | 0.07 | 5 | 1 | 50 | a fifth | yes | RA, to 32 inputs, 200 trees | all rows |
+/// | 50 000 | 0.07 | 5 | 1 | 50 | a fifth | yes | none | all rows |
+/// | 100 001 | 0.1 | 5 | 1 | 50 | about 20 000 | yes | none | 250 000 rows |
+///
+/// Whole groups of rows are held out. They decide which trees are taken and when boosting stops. Then the sum is fitted
+/// to all rows with a quarter more trees, if more than a twentieth was held out. With TrainingData::held_out these rows
+/// decide instead, and the sum of the other rows is the result. Where each fifth is held out in turn, the sum is a
+/// weighted mean of two variants and one tree, as fit() makes it; its error is that of the whole procedure, shares and
+/// number of trees chosen without the row. With more rows it is the mean of the sum and such a tree where the tree alone
+/// is better than the sum on the held-out rows.
 ///
 /// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
 ///

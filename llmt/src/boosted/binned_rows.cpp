@@ -117,4 +117,10 @@ BinnedFeature bin_feature(BoostedFeature feature, const Eigen::VectorXd& values,
   return result;
 }
 
+std::vector<int> all_rows(Eigen::Index count) {
+  std::vector<int> all(count);
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
 }  // namespace llmt

@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "llmt/boosted_model.hpp"
@@ -42,11 +44,27 @@ struct BinnedFeature {
 /// else cells or bins have about equal weight. An edge lies halfway between two neighbouring values. NaN: missing.
 BinnedFeature bin_feature(BoostedFeature feature, const Eigen::VectorXd& values, const Eigen::VectorXd& weights);
 
+/// A list whose copies share the features, so that copies with further ones take no memory for those that are there.
+class BinnedFeatures {
+ public:
+  void push_back(BinnedFeature feature) {
+    features_.push_back(std::make_shared<const BinnedFeature>(std::move(feature)));
+  }
+  std::size_t size() const { return features_.size(); }
+  const BinnedFeature& operator[](std::size_t k) const { return *features_[k]; }
+
+ private:
+  std::vector<std::shared_ptr<const BinnedFeature>> features_;
+};
+
 /// The rows of a fit.
 struct BinnedRows {
-  std::vector<BinnedFeature> features;
+  BinnedFeatures features = {};
   Eigen::VectorXd weights;
   bool equal_weights = true;  ///< all 1
 };
+
+/// The rows 0 ... count - 1.
+std::vector<int> all_rows(Eigen::Index count);
 
 }  // namespace llmt

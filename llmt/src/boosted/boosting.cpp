@@ -21,32 +21,30 @@ bool are_in_order(const std::vector<int>& train, const std::vector<int>& held_ou
   return true;
 }
 
-BinnedRows in_order(const BinnedRows& all, const std::vector<int>& rows) {
-  BinnedRows result{.features = {}, .weights = all.weights(rows), .equal_weights = all.equal_weights};
-  for (const BinnedFeature& feature : all.features) {
-    BinnedFeature& some = result.features.emplace_back();
-    some.feature = feature.feature;
-    some.edges = feature.edges;
-    some.last_cells = feature.last_cells;
-    some.centres = feature.centres;
-    some.has_missing = feature.has_missing;
-    some.low = feature.low;
-    some.high = feature.high;
-    some.cells.reserve(rows.size());
-    some.bins.reserve(rows.size());
-    some.values.reserve(rows.size());
-    for (const int row : rows) {
-      some.cells.push_back(feature.cells[row]);
-      some.bins.push_back(feature.bins[row]);
-      some.values.push_back(feature.values[row]);
-    }
-  }
+template <class T>
+std::vector<T> at(const std::vector<T>& values, const std::vector<int>& rows) {
+  std::vector<T> result;
+  result.reserve(rows.size());
+  for (const int row : rows) result.push_back(values[row]);
   return result;
 }
 
-double mean_square(const Eigen::Ref<const Eigen::VectorXd>& residuals,
-                   const Eigen::Ref<const Eigen::VectorXd>& weights) {
-  return residuals.cwiseAbs2().dot(weights) / weights.sum();
+BinnedRows in_order(const BinnedRows& all, const std::vector<int>& rows) {
+  BinnedRows result{.weights = all.weights(rows), .equal_weights = all.equal_weights};
+  for (std::size_t k = 0; k < all.features.size(); ++k) {
+    const BinnedFeature& feature = all.features[k];
+    result.features.push_back({.feature = feature.feature,
+                               .edges = feature.edges,
+                               .last_cells = feature.last_cells,
+                               .centres = feature.centres,
+                               .cells = at(feature.cells, rows),
+                               .bins = at(feature.bins, rows),
+                               .values = at(feature.values, rows),
+                               .has_missing = feature.has_missing,
+                               .low = feature.low,
+                               .high = feature.high});
+  }
+  return result;
 }
 
 // Of the first `count` rows, the others are held out.
@@ -60,11 +58,11 @@ Rounds boost_first(Grower grower, const BinnedRows& rows, Eigen::VectorXd residu
   residuals.array() -= result.base;
   const Eigen::Index num_held_out = residuals.size() - count;
   const auto held_out = residuals.tail(num_held_out);
-  const auto rmse = [&] { return std::sqrt(mean_square(held_out, rows.weights.tail(num_held_out))); };
+  const auto held_out_weights = rows.weights.tail(num_held_out);
   double best = std::numeric_limits<double>::infinity();
   int best_round = 0;
   if (num_held_out > 0) {
-    best = rmse();
+    best = rmse_of(held_out, held_out_weights);
     result.residuals = held_out;
     if (options.keep_path) result.path.push_back(held_out);
   }
@@ -75,7 +73,7 @@ Rounds boost_first(Grower grower, const BinnedRows& rows, Eigen::VectorXd residu
     grower.subtract_last(result.trees.back(), options.rate, residuals);
     if (num_held_out == 0) continue;
     if (options.keep_path) result.path.push_back(held_out);
-    const double error = rmse();
+    const double error = rmse_of(held_out, held_out_weights);
     if (error < best * (1.0 - 1e-9)) {
       best = error;
       best_round = round;
@@ -83,7 +81,7 @@ Rounds boost_first(Grower grower, const BinnedRows& rows, Eigen::VectorXd residu
     }
     if (round - best_round >= options.patience) break;
   }
-  result.train_rmse = std::sqrt(mean_square(residuals.head(count), rows.weights.head(count)));
+  result.train_rmse = rmse_of(residuals.head(count), rows.weights.head(count));
   if (num_held_out == 0) {
     result.residuals = residuals;
   } else {
@@ -93,7 +91,20 @@ Rounds boost_first(Grower grower, const BinnedRows& rows, Eigen::VectorXd residu
   return result;
 }
 
+void multiply(BoostedTree& tree, double by) {
+  for (BoostedLeaf& leaf : tree.leaves) {
+    leaf.constant *= by;
+    leaf.low *= by;
+    leaf.high *= by;
+    for (double& slope : leaf.slopes) slope *= by;
+  }
+}
+
 }  // namespace
+
+double rmse_of(const Eigen::Ref<const Eigen::VectorXd>& residuals, const Eigen::Ref<const Eigen::VectorXd>& weights) {
+  return std::sqrt(residuals.cwiseAbs2().dot(weights) / weights.sum());
+}
 
 Rounds boost(const BinnedRows& rows, const Eigen::VectorXd& output, const std::vector<int>& train,
              const std::vector<int>& held_out, const std::vector<GrowingTree>& structures, const RoundOptions& options,
@@ -101,8 +112,7 @@ Rounds boost(const BinnedRows& rows, const Eigen::VectorXd& output, const std::v
   if (!are_in_order(train, held_out)) {
     std::vector<int> all = train;
     all.insert(all.end(), held_out.begin(), held_out.end());
-    std::vector<int> first(all.size());
-    std::iota(first.begin(), first.end(), 0);
+    std::vector<int> first = all_rows(std::ssize(all));
     const std::vector<int> others(first.begin() + std::ssize(train), first.end());
     first.resize(train.size());
     return boost(in_order(rows, all), output(all), first, others, structures, options, random, work);
@@ -115,6 +125,21 @@ Rounds boost(const BinnedRows& rows, const Eigen::VectorXd& output, const std::v
   }
   TreeGrower grower(rows, count, options.tree, options.max_threads);
   return boost_first(std::move(grower), rows, residuals, count, structures, options, random, work);
+}
+
+BoostedSum sum_of(const std::vector<SumPart>& members, const BinnedRows& rows, double mean, double scale) {
+  BoostedSum sum{.base = mean, .rate = members.front().rate, .features = {}, .trees = {}};
+  for (std::size_t k = 0; k < rows.features.size(); ++k) sum.features.push_back(rows.features[k].feature);
+  for (const SumPart& part : members) {
+    sum.base += scale * part.share * part.rounds.base;
+    const auto add = [&](BoostedTree tree, double rate) {
+      multiply(tree, scale * (part.share * rate / sum.rate));
+      sum.trees.push_back(std::move(tree));
+    };
+    for (const BoostedTree& tree : part.start) add(tree, 1.0);
+    for (const GrowingTree& tree : part.rounds.trees) add(finished(tree, rows), part.rate);
+  }
+  return sum;
 }
 
 }  // namespace llmt

@@ -33,11 +33,26 @@ struct Rounds {
   double train_rmse = 0.0;                 ///< on the others; with held-out rows, after the last round that was tried
 };
 
+/// The square root of the weighted mean of squares.
+double rmse_of(const Eigen::Ref<const Eigen::VectorXd>& residuals, const Eigen::Ref<const Eigen::VectorXd>& weights);
+
 /// Boosts on the rows `train` until the error on `held_out` has not become smaller for `patience` rounds, and keeps the
 /// trees up to the smallest. Without held-out rows it makes most_rounds trees. `structures`: trees whose splits the
 /// first rounds take.
 Rounds boost(const BinnedRows& rows, const Eigen::VectorXd& output, const std::vector<int>& train,
              const std::vector<int>& held_out, const std::vector<GrowingTree>& structures, const RoundOptions& options,
              Random& random, Work& work);
+
+/// Rounds that are a part of a sum, with the trees whose residuals they started from.
+struct SumPart {
+  double share = 1.0;
+  double rate = 1.0;
+  Rounds rounds = {};
+  std::vector<BoostedTree> start = {};
+};
+
+/// mean + scale . sum of share . (base + start + rate . trees), the shares adding up to 1. Its rate is the first
+/// part's; the leaves of the other trees are multiplied by what theirs differs.
+BoostedSum sum_of(const std::vector<SumPart>& members, const BinnedRows& rows, double mean, double scale);
 
 }  // namespace llmt

@@ -8,9 +8,11 @@
 #include <map>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <tuple>
 #include <utility>
 
+#include "base/count.hpp"
 #include "boosted/model/boosted_checks.hpp"
 #include "boosted/packed_sums.hpp"
 #include "data/equal_rows.hpp"
@@ -21,13 +23,7 @@ namespace llmt {
 namespace {
 
 constexpr double largest_extent = 1e100;  // sums of two standardised inputs stay finite
-
-// Below this number of rows one hold-out decides by chance: five of them decide together.
-constexpr Eigen::Index few_rows = 500;
-constexpr Eigen::Index fewest_parts = 5;
-constexpr Eigen::Index rows_of_part = 20000;  // of many rows: as many decide as well as a fifth
-
-Eigen::Index num_parts_of(Eigen::Index rows) { return rows > many_rows ? rows / rows_of_part : fewest_parts; }
+constexpr Eigen::Index fewest_groups = 5;
 
 void check_options(const BoostOptions& options) {
   if (!(options.rate >= 0.0 && options.rate <= 1.0)) {
@@ -50,7 +46,11 @@ struct DifferentRows {
   std::vector<double> weights;
 };
 
-DifferentRows different_rows(const GivenRows& given, const RowNumbers& numbers, const std::vector<Eigen::Index>& rows) {
+DifferentRows different_rows(const GivenRows& given, int max_threads) {
+  const std::vector<Eigen::Index> rows = counted_rows(given);
+  const RowNumbers numbers = given.numbers ? at(*given.numbers, rows)
+                                           : number_rows(given.inputs.values, given.outputs.values, rows, max_threads);
+  const bool weighted = given.weights.size() > 0 && !given.are_counts;
   DifferentRows result;
   std::map<std::tuple<int, double, bool>, std::size_t> seen;
   for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -63,55 +63,33 @@ DifferentRows different_rows(const GivenRows& given, const RowNumbers& numbers, 
       result.first.push_back(row);
       result.weights.push_back(0.0);
     }
-    result.weights[found->second] += given.weights.size() == 0 ? 1.0 : given.weights(row);
+    result.weights[found->second] += weighted ? given.weights(row) : 1.0;
   }
   return result;
-}
-
-GivenRows checked_rows(const TrainingData& data, const BoostOptions& options) {
-  FitOptions checks;
-  checks.max_threads = options.max_threads;
-  checks.folds.count = 0;  // nothing is dealt, and rows are numbered here
-  GivenRows given = given_rows(data);
-  std::vector<bool> held_out = std::exchange(given.held_out, {});
-  GivenRows result = checked(std::move(given), checks);
-  result.held_out = std::move(held_out);
-  return result;
-}
-
-std::vector<Eigen::Index> weighted_rows(const GivenRows& given) {
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index row = 0; row < given.inputs.values.rows(); ++row) {
-    if (given.weights.size() == 0 || given.weights(row) > 0.0) rows.push_back(row);
-  }
-  return rows;
 }
 
 // Of each of the rows a number that those share which are held out together.
 std::vector<int> units_of(const GivenRows& given, const std::vector<Eigen::Index>& rows) {
-  std::vector<int> units(rows.size());
-  std::iota(units.begin(), units.end(), 0);
-  if (!given.groups.empty()) {
-    std::map<double, int> seen;
-    for (std::size_t k = 0; k < rows.size(); ++k) {
-      units[k] = seen.try_emplace(given.groups[rows[k]], static_cast<int>(seen.size())).first->second;
-    }
-    return units;
+  if (given.groups.empty()) {
+    const EqualRows equal = find_equal_rows(given.inputs.values, rows, at(*given.numbers, rows));
+    return equal.group.empty() ? all_rows(std::ssize(rows)) : equal.group;
   }
-  const RowNumbers numbers = number_rows(given.inputs.values, given.outputs.values, rows);
-  if (numbers.by_inputs.empty()) return units;
-  const EqualRows equal = find_equal_rows(given.inputs.values, rows, numbers);
-  return equal.group.empty() ? units : equal.group;
+  std::vector<int> units;
+  std::map<double, int> seen;
+  for (const Eigen::Index row : rows) {
+    units.push_back(seen.try_emplace(given.groups[row], count_of(seen)).first->second);
+  }
+  return units;
 }
 
 // The part of each row; rows of one unit are in one part.
-std::vector<int> deal(const std::vector<int>& units, std::uint64_t seed) {
-  const Eigen::Index count = *std::ranges::max_element(units) + 1;
-  if (count < fewest_parts) {
+std::vector<int> deal(const std::vector<int>& units, const Regime& regime, std::uint64_t seed) {
+  const Eigen::Index count = std::ranges::max(units) + 1;
+  if (count < fewest_groups) {
     throw std::invalid_argument(
-        fmt::format("llmt::fit_boosted: there are {} groups of rows, at least {} are needed", count, fewest_parts));
+        fmt::format("llmt::fit_boosted: there are {} groups of rows, at least {} are needed", count, fewest_groups));
   }
-  const Eigen::Index num_parts = std::min(num_parts_of(std::ssize(units)), count);
+  const Eigen::Index num_parts = std::min(num_parts_of(regime, std::ssize(units)), count);
   const std::vector<Eigen::Index> order = Random(seed).permutation(count);
   std::vector<int> part(count);
   for (Eigen::Index k = 0; k < count; ++k) part[order[k]] = static_cast<int>(k % num_parts);
@@ -120,76 +98,51 @@ std::vector<int> deal(const std::vector<int>& units, std::uint64_t seed) {
   return result;
 }
 
-std::vector<HoldOut> hold_outs_of(const std::vector<int>& part) {
-  std::vector<HoldOut> result(std::ssize(part) < few_rows ? fewest_parts : 1);
-  for (int k = 0; k < std::ssize(result); ++k) {
-    for (int row = 0; row < std::ssize(part); ++row) {
-      (part[row] == k ? result[k].held_out : result[k].train).push_back(row);
-    }
-  }
-  return result;
-}
-
-HoldOut given_hold_out(const GivenRows& given, const std::vector<Eigen::Index>& rows) {
-  HoldOut result;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    (given.held_out[rows[k]] ? result.held_out : result.train).push_back(static_cast<int>(k));
-  }
-  if (result.held_out.empty() || result.train.empty()) {
-    throw std::invalid_argument("llmt::fit_boosted: held_out has all rows that count, or none of them");
-  }
-  return result;
-}
-
-bool is_held_out(const BoostingData& data, const GivenRows& given, const DifferentRows& rows, Eigen::Index k) {
-  return data.is_hold_out_given ? given.held_out[rows.first[k]] : data.parts[k] == 0;
-}
-
-// Puts the rows in random order, so that any of them one after the other are a fair sample, and those that are held out
-// behind all others.
-void shuffle(DifferentRows& rows, BoostingData& data, const GivenRows& given, std::uint64_t seed) {
+// Puts the rows in random order, so that any of them one after the other are a fair sample, and those of the part 0,
+// which are held out, behind all others.
+void shuffle(DifferentRows& rows, std::vector<int>& parts, std::uint64_t seed) {
   const std::vector<Eigen::Index> order = Random(seed).permutation(std::ssize(rows.first));
   DifferentRows ordered;
-  std::vector<int> parts;
+  std::vector<int> ordered_parts;
   for (const bool held_out : {false, true}) {
     for (const Eigen::Index k : order) {
-      if (is_held_out(data, given, rows, k) != held_out) continue;
+      if ((parts[k] == 0) != held_out) continue;
       ordered.first.push_back(rows.first[k]);
       ordered.weights.push_back(rows.weights[k]);
-      if (!data.parts.empty()) parts.push_back(data.parts[k]);
+      ordered_parts.push_back(parts[k]);
     }
   }
   rows = std::move(ordered);
-  data.parts = std::move(parts);
+  parts = std::move(ordered_parts);
 }
 
-InputColumn describe(const TrainingData& data, const GivenRows& given, const BoostingData& result, Eigen::Index input,
-                     double& deviation) {
+// The column of an input, and the deviation that its values are divided by.
+std::pair<InputColumn, double> describe(const TrainingData& data, const GivenRows& given, const BoostingData& result,
+                                        Eigen::Index input) {
   InputColumn column;
-  const auto name = [&](const auto& names, Eigen::Index k) {
-    return names.empty() ? fmt::format("x{}", k + 1) : names[k];
+  column.name = data.input_names.empty() ? fmt::format("x{}", input + 1) : data.input_names[input];
+  const auto visit_values = [&](const auto& visit) {
+    for (Eigen::Index i = 0; i < result.x.rows(); ++i) {
+      if (!std::isnan(result.x(i, input))) visit(result.x(i, input), result.rows.weights(i));
+    }
   };
-  column.name = name(data.input_names, input);
-  const Eigen::VectorXd values = result.x.col(input);
   double weight = 0.0;
   double sum = 0.0;
-  column.low = std::numeric_limits<double>::infinity();
-  column.high = -column.low;
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (std::isnan(values(i))) continue;
-    column.low = std::min(column.low, values(i));
-    column.high = std::max(column.high, values(i));
-    weight += result.rows.weights(i);
-    sum += result.rows.weights(i) * values(i);
-  }
-  deviation = 1.0;
-  if (weight == 0.0) {
-    column.low = column.high = 0.0;
-    return column;
-  }
-  column.centre = std::clamp(sum / weight, column.low, column.high);
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  visit_values([&](double value, double of_row) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+    weight += of_row;
+    sum += of_row * value;
+  });
+  if (weight == 0.0) low = high = 0.0;
+  column.low = low;
+  column.high = high;
+  if (weight == 0.0) return {column, 1.0};
+  column.centre = std::clamp(sum / weight, low, high);
   if (std::ranges::count(given.categorical, input) > 0) {
-    const auto levels = static_cast<int>(column.high) + 1;
+    const auto levels = static_cast<int>(high) + 1;
     if (levels > most_boosted_levels) {
       throw std::invalid_argument(
           fmt::format("llmt::fit_boosted: input \"{}\" has {} levels, boosting takes at most {}; leave it out, or put "
@@ -200,83 +153,90 @@ InputColumn describe(const TrainingData& data, const GivenRows& given, const Boo
       const bool has_name = !data.levels.empty() && !data.levels[input].empty();
       column.levels.push_back(has_name ? data.levels[input][level] : fmt::format("{}", level));
     }
-    return column;
+    return {column, 1.0};
   }
   double squares = 0.0;
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (std::isnan(values(i))) continue;
-    const double from_centre = values(i) - column.centre;
-    squares += result.rows.weights(i) * from_centre * from_centre;
-  }
-  if (squares > 0.0) deviation = std::sqrt(squares / weight);
-  if (std::max(std::abs(column.low), std::abs(column.high)) / deviation > largest_extent) deviation = 1.0;
-  return column;
+  visit_values(
+      [&](double value, double of_row) { squares += of_row * (value - column.centre) * (value - column.centre); });
+  const double deviation = squares > 0.0 ? std::sqrt(squares / weight) : 1.0;
+  return {column, std::max(std::abs(low), std::abs(high)) / deviation > largest_extent ? 1.0 : deviation};
 }
 
 void describe_columns(const TrainingData& data, const GivenRows& given, BoostingData& result) {
   for (Eigen::Index j = 0; j < result.x.cols(); ++j) {
-    double deviation = 1.0;
-    result.inputs.push_back(describe(data, given, result, j, deviation));
+    auto [column, deviation] = describe(data, given, result, j);
+    result.inputs.push_back(std::move(column));
     result.deviations.push_back(deviation);
   }
   for (Eigen::Index o = 0; o < result.y.cols(); ++o) {
-    OutputColumn column;
-    const bool single = result.y.cols() == 1;
-    column.name = !data.output_names.empty() ? data.output_names[o] : single ? "y" : fmt::format("y{}", o + 1);
-    column.low = result.y.col(o).minCoeff();
-    column.high = result.y.col(o).maxCoeff();
-    result.outputs.push_back(column);
+    const std::string name = result.y.cols() == 1 ? "y" : fmt::format("y{}", o + 1);
+    result.outputs.push_back({.name = data.output_names.empty() ? name : data.output_names[o],
+                              .low = result.y.col(o).minCoeff(),
+                              .high = result.y.col(o).maxCoeff()});
   }
 }
 
 }  // namespace
 
-void add_feature(BoostingData& data, const BoostedFeature& feature) {
+BinnedFeature feature_of(const BoostingData& data, const BoostedFeature& feature) {
   Eigen::VectorXd values(data.x.rows());
-  Eigen::VectorXd row(data.x.cols());
+  std::vector<double> row(data.x.cols());  // no other input of it is read
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    row = data.x.row(i);
+    row[feature.first] = data.x(i, feature.first);
+    if (feature.second >= 0) row[feature.second] = data.x(i, feature.second);
     values(i) = feature_at(feature, data.inputs, data.deviations, row.data());
   }
-  data.rows.features.push_back(bin_feature(feature, values, data.rows.weights));
+  return bin_feature(feature, values, data.rows.weights);
+}
+
+HoldOut part_apart(const std::vector<int>& parts, int part) {
+  HoldOut rows;
+  for (int row = 0; row < std::ssize(parts); ++row) {
+    (parts[row] == part ? rows.held_out : rows.train).push_back(row);
+  }
+  return rows;
 }
 
 BoostingData boosting_data(const TrainingData& data, const BoostOptions& options) {
   check_options(options);
-  const GivenRows given = checked_rows(data, options);
-  const std::vector<Eigen::Index> rows = weighted_rows(given);
-  const RowNumbers numbers = number_rows(given.inputs.values, given.outputs.values, rows, options.max_threads);
-  DifferentRows different = different_rows(given, numbers, rows);
-  const bool few = std::ssize(different.first) < fewest_boosted_rows;
+  const GivenRows given = checked(given_rows(data), {.max_threads = options.max_threads});
+  DifferentRows different = different_rows(given, options.max_threads);
+  const Eigen::Index count = std::ssize(different.first);
+  const bool few = count < fewest_boosted_rows;
   if (few && !options.mean_of_few) {
     throw std::invalid_argument(
         fmt::format("llmt::fit_boosted: different rows: {}; a sum of trees needs at least {}, one tree takes fewer",
-                    different.first.size(), fewest_boosted_rows));
+                    count, fewest_boosted_rows));
   }
-  if (std::ssize(different.first) > most_boosted_rows) {
-    throw std::invalid_argument(fmt::format("llmt::fit_boosted: there are {} different rows, at most {} are taken",
-                                            different.first.size(), most_boosted_rows));
+  if (count > most_boosted_rows) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit_boosted: there are {} different rows, at most {} are taken", count, most_boosted_rows));
   }
   BoostingData result;
   result.is_hold_out_given = !given.held_out.empty();
-  if (!few && !result.is_hold_out_given) result.parts = deal(units_of(given, different.first), options.seed);
-  if (std::ssize(different.first) > many_rows) shuffle(different, result, given, options.seed);
+  result.regime = regime_of(result.is_hold_out_given ? std::max(count, enough_for_one_hold_out) : count,
+                            given.inputs.values.cols());
+  if (result.is_hold_out_given) {
+    for (const Eigen::Index row : different.first) result.parts.push_back(given.held_out[row] ? 0 : 1);
+  } else if (!few) {
+    result.parts = deal(units_of(given, different.first), result.regime, options.seed);
+  }
+  if (result.regime.searched < no_limit) shuffle(different, result.parts, options.seed);
   result.x = given.inputs.values(different.first, Eigen::all);
   result.y = given.outputs.values(different.first, Eigen::all);
-  result.rows.weights = Eigen::Map<const Eigen::VectorXd>(different.weights.data(), std::ssize(different.weights));
+  result.rows.weights = Eigen::Map<const Eigen::VectorXd>(different.weights.data(), count);
   if (given.weights.size() > 0 && !given.are_counts) result.rows.weights /= result.rows.weights.mean();
   result.rows.equal_weights = (result.rows.weights.array() == 1.0).all();
-  if (few) {  // nothing can be held out
-    describe_columns(data, given, result);
-    return result;
-  }
-  result.hold_outs = result.is_hold_out_given ? std::vector<HoldOut>{given_hold_out(given, different.first)}
-                                              : hold_outs_of(result.parts);
   describe_columns(data, given, result);
+  if (few) return result;  // nothing can be held out
+  const Eigen::Index turns = result.regime.takes_turns ? num_parts_of(result.regime, count) : 1;
+  for (int part = 0; part < turns; ++part) result.hold_outs.push_back(part_apart(result.parts, part));
   for (int j = 0; j < std::ssize(result.inputs); ++j) {
-    const int levels = static_cast<int>(result.inputs[j].levels.size());
-    if (levels == 0) add_feature(result, {.first = j});
-    for (int level = 0; level < levels; ++level) add_feature(result, {.first = j, .level = level});
+    const int levels = count_of(result.inputs[j].levels);
+    if (levels == 0) result.rows.features.push_back(feature_of(result, {.first = j}));
+    for (int level = 0; level < levels; ++level) {
+      result.rows.features.push_back(feature_of(result, {.first = j, .level = level}));
+    }
   }
   return result;
 }

@@ -6,12 +6,10 @@
 #include <vector>
 
 #include "boosted/binned_rows.hpp"
+#include "boosted/regime.hpp"
 #include "llmt/boosted.hpp"
 
 namespace llmt {
-
-/// Above this number of rows fewer than a fifth are held out, all are in random order, and the rate is larger.
-inline constexpr Eigen::Index many_rows = 100000;
 
 /// Which rows boosting learns from, and which stop it.
 struct HoldOut {
@@ -23,10 +21,11 @@ struct BoostingData {
   std::vector<InputColumn> inputs;
   std::vector<OutputColumn> outputs;
   std::vector<double> deviations;
+  Regime regime;
   BinnedRows rows;                 ///< with a feature for each numeric input and each level
   Eigen::MatrixXd y;               ///< outputs of the rows
   std::vector<HoldOut> hold_outs;  ///< empty: too few rows, whose mean is the model
-  std::vector<int> parts;  ///< of each row, 0 ... 4; the set k of hold_outs is the part k. Empty: given, or none
+  std::vector<int> parts;          ///< of each row; hold_outs[k] holds the part k out
   bool is_hold_out_given = false;  ///< TrainingData::held_out: these rows are not fitted to
   Eigen::MatrixXd x;               ///< inputs of the rows
 };
@@ -34,7 +33,10 @@ struct BoostingData {
 /// Throws std::invalid_argument as fit_boosted().
 BoostingData boosting_data(const TrainingData& data, const BoostOptions& options);
 
-/// Puts a feature behind those that are there.
-void add_feature(BoostingData& data, const BoostedFeature& feature);
+/// A feature of the rows.
+BinnedFeature feature_of(const BoostingData& data, const BoostedFeature& feature);
+
+/// The rows of one part are held out. `parts`: of each row.
+HoldOut part_apart(const std::vector<int>& parts, int part);
 
 }  // namespace llmt

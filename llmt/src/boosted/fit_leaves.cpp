@@ -9,7 +9,6 @@
 #include "base/parallel.hpp"
 #include "base/sum_over.hpp"
 #include "boosted/growing_tree.hpp"
-#include "boosted/leaf_model.hpp"
 #include "boosted/model/transition.hpp"
 
 namespace llmt {
@@ -124,24 +123,19 @@ void TreeGrower::fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::spa
     if (rows_.equal_weights) return shares.empty() ? sums(false_type(), false_type()) : sums(true_type(), false_type());
     return shares.empty() ? sums(false_type(), true_type()) : sums(true_type(), true_type());
   });
-  LeafModel model{.constant = leaf.model.constant};
-  std::copy_n(leaf.model.slopes.begin(), size, model.slopes.begin());
-  add_estimate(model, size, leaf_sums, options_.ridges);
-  leaf.model.constant = model.constant;
-  for (int j = 0; j < size; ++j) leaf.model.slopes[j] = model.slopes[j];
-  leaf.low = model.low;
-  leaf.high = model.high;
+  add_estimate(leaf.model, size, leaf_sums, options_.ridges);
 }
 
 // A leaf without rows keeps its path's model within the range of the rows of the nearest node above.
 void TreeGrower::hold_empty(GrowingNode& leaf, const Eigen::VectorXd& residuals) const {
   int above = leaf.parent;
   while (tree_[above].count() == 0) above = tree_[above].parent;
-  leaf.low = std::numeric_limits<double>::infinity();
-  leaf.high = -leaf.low;
+  auto& [constant, low, high, slopes] = static_cast<LeafModel&>(leaf.model);
+  low = std::numeric_limits<double>::infinity();
+  high = -low;
   for (Eigen::Index k = tree_[above].begin; k < tree_[above].end; ++k) {
-    leaf.low = std::min(leaf.low, residuals(order_[k]));
-    leaf.high = std::max(leaf.high, residuals(order_[k]));
+    low = std::min(low, residuals(order_[k]));
+    high = std::max(high, residuals(order_[k]));
   }
 }
 
@@ -172,7 +166,7 @@ void TreeGrower::subtract_last(const GrowingTree& tree, double rate, Eigen::Vect
     with_size<most_boosted_slopes>(static_cast<int>(leaf.model.features.size()), [&](auto size) {
       const PathValues<size()> model(leaf.model, rows_);
       for (std::size_t i = 0; i < rows.size(); ++i) {
-        const double value = std::clamp(model.at(rows[i]), leaf.low, leaf.high);
+        const double value = std::clamp(model.at(rows[i]), leaf.model.low, leaf.model.high);
         residuals(rows[i]) -= rate * (shares.empty() ? value : shares[i] * value);
       }
     });
@@ -190,7 +184,8 @@ void TreeGrower::subtract_last(const GrowingTree& tree, double rate, Eigen::Vect
 double value_at(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row) {
   double sum = 0.0;
   visit(tree, rows, row, 0, 1.0, [&](int leaf, double share) {
-    sum += share * std::clamp(tree[leaf].model.at(rows, row), tree[leaf].low, tree[leaf].high);
+    const PathModel& model = tree[leaf].model;
+    sum += share * std::clamp(model.at(rows, row), model.low, model.high);
   });
   return sum;
 }
@@ -206,7 +201,12 @@ BoostedTree finished(const GrowingTree& tree, const BinnedRows& rows) {
           {node.feature, rows.features[node.feature].edges[node.cell], node.half_width, node.missing_left, 0, 0});
     } else {
       number[k] = -1 - static_cast<int>(result.leaves.size());
-      result.leaves.push_back({node.model.constant, node.low, node.high, node.model.features, node.model.slopes});
+      const PathModel& model = node.model;
+      result.leaves.push_back({.constant = model.constant,
+                               .low = model.low,
+                               .high = model.high,
+                               .features = {model.features.begin(), model.features.end()},
+                               .slopes = {model.slopes.begin(), model.slopes.begin() + model.features.size()}});
     }
   }
   for (std::size_t k = 0; k < tree.size(); ++k) {

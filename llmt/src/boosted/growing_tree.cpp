@@ -5,9 +5,6 @@
 #include <numeric>
 #include <utility>
 
-#include "base/parallel.hpp"
-#include "boosted/leaf_model.hpp"
-
 namespace llmt {
 
 TreeGrower::TreeGrower(const BinnedRows& rows, Eigen::Index count, TreeOptions options, int max_threads)
@@ -74,10 +71,22 @@ std::vector<int> some_features(std::size_t all, double share, Random& random) {
   return result;
 }
 
-SplitChoice best_of_gains(const BinnedFeature& column, int feature, const Gains& gains, bool missing_left) {
+FeatureGains::FeatureGains(const BinnedRows& rows, int feature) : feature_(feature), column_(&rows.features[feature]) {
+  for (Gains& gains : gains_) gains.fill(0.0);
+}
+
+void FeatureGains::add(const Histogram& histogram, const PackedUnits& units, const Ridges& ridges, bool slopes) {
+  add_gains(gains_[0], *column_, histogram, units, ridges, slopes, false);
+  if (column_->has_missing) add_gains(gains_[1], *column_, histogram, units, ridges, slopes, true);
+}
+
+SplitChoice FeatureGains::best() const {
   SplitChoice best;
-  for (int t = 0; t + 1 < column.num_bins(); ++t) {
-    best.take_if_better({gains[t], feature, column.last_cells[t], missing_left});
+  for (const bool missing_left : {false, true}) {
+    if (missing_left && !column_->has_missing) continue;
+    for (int t = 0; t + 1 < column_->num_bins(); ++t) {
+      best.take_if_better({gains_[missing_left ? 1 : 0][t], feature_, column_->last_cells[t], missing_left});
+    }
   }
   return best;
 }
@@ -87,56 +96,31 @@ bool TreeGrower::may_have_slope(const GrowingNode& node, int feature) const {
 }
 
 SplitChoice TreeGrower::best_of_features(std::span<const int> leaves, std::span<const int> features) const {
-  struct Column {
-    const BinnedFeature* feature = nullptr;
-    Gains gains;
-    Gains gains_missing_left;
-    Histogram histogram;
-  };
-  std::array<Column, features_at_once> columns;
+  std::array<FeatureGains, features_at_once> gains;
+  std::array<Histogram, features_at_once> sums;
   std::array<HistogramOf, features_at_once> histograms;
-  const auto some = std::span(columns).first(features.size());
   for (std::size_t k = 0; k < features.size(); ++k) {
-    columns[k].feature = &rows_.features[features[k]];
-    columns[k].gains.fill(0.0);
-    if (columns[k].feature->has_missing) columns[k].gains_missing_left.fill(0.0);
-    histograms[k] = {columns[k].feature->bins.data(), &columns[k].histogram};
+    gains[k] = FeatureGains(rows_, features[k]);
+    histograms[k] = {rows_.features[features[k]].bins.data(), &sums[k]};
   }
   for (const int leaf : leaves) {
     const GrowingNode& node = tree_[leaf];
     if (node.count() == 0) continue;
-    for (Column& column : some) column.histogram.fill(0);
+    for (Histogram& histogram : sums) histogram.fill(0);
     add_to(std::span(histograms).first(features.size()), std::span(order_).subspan(node.begin, node.count()),
            std::span(terms_).subspan(node.begin, node.count()));
     for (std::size_t k = 0; k < features.size(); ++k) {
-      const auto& [feature, gains, gains_missing_left, histogram] = columns[k];
-      const bool slopes = may_have_slope(node, features[k]);
-      add_gains(columns[k].gains, *feature, histogram, units_, options_.ridges, slopes, false);
-      if (feature->has_missing) {
-        add_gains(columns[k].gains_missing_left, *feature, histogram, units_, options_.ridges, slopes, true);
-      }
+      gains[k].add(sums[k], units_, options_.ridges, may_have_slope(node, features[k]));
     }
   }
   SplitChoice best;
-  for (std::size_t k = 0; k < features.size(); ++k) {
-    const BinnedFeature& column = *columns[k].feature;
-    best.take_if_better(best_of_gains(column, features[k], columns[k].gains, false));
-    if (column.has_missing)
-      best.take_if_better(best_of_gains(column, features[k], columns[k].gains_missing_left, true));
-  }
+  for (std::size_t k = 0; k < features.size(); ++k) best.take_if_better(gains[k].best());
   return best;
 }
 
-SplitChoice TreeGrower::best_split(std::span<const int> leaves, const std::vector<int>& features) const {
-  std::vector<SplitChoice> of_some((features.size() + features_at_once - 1) / features_at_once);
-  parallel_for(std::ssize(of_some), max_threads_, [&](Eigen::Index k) {
-    const std::size_t first = k * features_at_once;
-    const std::size_t count = std::min(features_at_once, features.size() - first);
-    of_some[k] = best_of_features(leaves, std::span(features).subspan(first, count));
-  });
-  SplitChoice best;
-  for (const SplitChoice& one : of_some) best.take_if_better(one);
-  return best;
+SplitChoice TreeGrower::best_split(std::span<const int> leaves, Random& random) const {
+  return best_of_all(some_features(rows_.features.size(), options_.columns, random), max_threads_,
+                     [&](std::span<const int> some) { return best_of_features(leaves, some); });
 }
 
 void TreeGrower::split_rows(int index) {
@@ -177,11 +161,12 @@ void TreeGrower::add_to_path(GrowingNode& side, int feature) {
   side.model.constant += constant;
   if (has_slope) {
     const auto found = std::ranges::find(side.model.features, feature);
+    double& of_feature = side.model.slopes[found - side.model.features.begin()];
     if (found == side.model.features.end()) {
       side.model.features.push_back(feature);
-      side.model.slopes.push_back(slope);
+      of_feature = slope;
     } else {
-      side.model.slopes[found - side.model.features.begin()] += slope;
+      of_feature += slope;
     }
   }
   for (Eigen::Index k = side.begin; k < side.end; ++k)
@@ -220,7 +205,7 @@ void TreeGrower::split(std::span<const int> leaves, std::span<const SplitChoice>
 void TreeGrower::grow_symmetric(Random& random) {
   std::vector<int> leaves = {0};
   for (int level = 0; level < options_.depth; ++level) {
-    const SplitChoice best = best_split(leaves, some_features(rows_.features.size(), options_.columns, random));
+    const SplitChoice best = best_split(leaves, random);
     is_searching_ = level + 1 < options_.depth;
     if (best.feature < 0) continue;
     std::vector<int> with_rows;
@@ -235,9 +220,7 @@ void TreeGrower::grow_symmetric(Random& random) {
 
 void TreeGrower::grow_free(Random& random) {
   std::vector<SplitChoice> best_of(1);
-  const auto look = [&](int leaf) {
-    best_of[leaf] = best_split(std::vector<int>{leaf}, some_features(rows_.features.size(), options_.columns, random));
-  };
+  const auto look = [&](int leaf) { best_of[leaf] = best_split(std::vector<int>{leaf}, random); };
   look(0);
   for (int leaves = 1; leaves < options_.leaves; ++leaves) {
     const auto best = std::ranges::max_element(best_of, {}, &SplitChoice::gain);

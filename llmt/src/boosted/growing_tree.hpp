@@ -3,11 +3,15 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <limits>
 #include <span>
 #include <vector>
 
+#include "base/parallel.hpp"
 #include "boosted/binned_rows.hpp"
-#include "boosted/few.hpp"
+#include "boosted/leaf_model.hpp"
 #include "boosted/packed_sums.hpp"
 #include "boosted/split_gain.hpp"
 #include "llmt/random.hpp"
@@ -23,13 +27,28 @@ struct TreeOptions {
   double softness = 0.0;  ///< half width of a transition by the distance to the node's border; 0: crisp
   double columns = 0.5;   ///< share of the features that a level, or a leaf of a free tree, looks at
   double fewest = 1.0;    ///< rows on either side of a split of a free tree
+  /// Of more rows the splits of a crisp symmetric tree are found on a part of so many at most, another one for each
+  /// tree. Leaves are estimated on all rows.
+  Eigen::Index searched = std::numeric_limits<Eigen::Index>::max();
+};
+
+/// The features that have slopes, without memory of their own: nodes are made and copied by the thousand.
+class SlopeFeatures {
+ public:
+  std::size_t size() const { return size_; }
+  void push_back(int feature) { features_[size_++] = feature; }
+  int operator[](std::size_t k) const { return features_[k]; }
+  const int* begin() const { return features_.data(); }
+  const int* end() const { return features_.data() + size_; }
+
+ private:
+  std::array<int, most_boosted_slopes> features_ = {};
+  std::size_t size_ = 0;
 };
 
 /// The model of a node: what the splits on the way to it added.
-struct PathModel {
-  double constant = 0.0;
-  Few<int> features = {};
-  Few<double> slopes = {};
+struct PathModel : LeafModel {
+  SlopeFeatures features = {};
 
   double at(const BinnedRows& rows, Eigen::Index row) const {
     double value = constant;
@@ -49,8 +68,6 @@ struct GrowingNode {
   Eigen::Index begin = 0;  ///< of its rows among the grower's
   Eigen::Index end = 0;
   PathModel model = {};
-  double low = 0.0;
-  double high = 0.0;
 
   Eigen::Index count() const { return end - begin; }
 };
@@ -69,8 +86,34 @@ struct SplitChoice {
   }
 };
 
-/// The best threshold of a feature from the gains of all.
-SplitChoice best_of_gains(const BinnedFeature& column, int feature, const Gains& gains, bool missing_left);
+/// What the thresholds of a feature gain in some leaves, with missing values on either side.
+class FeatureGains {
+ public:
+  FeatureGains() = default;
+  FeatureGains(const BinnedRows& rows, int feature);
+
+  /// Adds those of a leaf, see add_gains().
+  void add(const Histogram& histogram, const PackedUnits& units, const Ridges& ridges, bool slopes);
+  SplitChoice best() const;
+
+ private:
+  int feature_ = -1;
+  const BinnedFeature* column_ = nullptr;
+  std::array<Gains, 2> gains_;  // the second one with missing values on the left
+};
+
+/// The best of the choices `best_of(some)` among at most `features_at_once` features each.
+template <class BestOf>
+SplitChoice best_of_all(std::span<const int> features, int max_threads, const BestOf& best_of) {
+  std::vector<SplitChoice> of_some((features.size() + features_at_once - 1) / features_at_once);
+  parallel_for(std::ssize(of_some), max_threads, [&](Eigen::Index k) {
+    const std::size_t first = k * features_at_once;
+    of_some[k] = best_of(features.subspan(first, std::min(features_at_once, features.size() - first)));
+  });
+  SplitChoice best;
+  for (const SplitChoice& one : of_some) best.take_if_better(one);
+  return best;
+}
 
 /// The features that a level, or a leaf of a free tree, looks at, in ascending order.
 std::vector<int> some_features(std::size_t all, double share, Random& random);
@@ -116,7 +159,7 @@ class TreeGrower {
   void begin(const Eigen::VectorXd& residuals);
   void pack(const GrowingNode& node);
   SplitChoice best_of_features(std::span<const int> leaves, std::span<const int> features) const;
-  SplitChoice best_split(std::span<const int> leaves, const std::vector<int>& features) const;
+  SplitChoice best_split(std::span<const int> leaves, Random& random) const;
   SplitChoice refined(std::span<const int> leaves, SplitChoice choice);
   void gather(const GrowingNode& node, int feature);
   RowsInOrder rows_of(const GrowingNode& node) const;

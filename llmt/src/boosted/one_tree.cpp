@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 #include <vector>
 
 #include "boosted/linear_start.hpp"
 #include "boosted/model/boosted_checks.hpp"
-#include "llmt/fit.hpp"
+#include "fit/pipeline.hpp"
+#include "fit/prepare.hpp"
 
 namespace llmt {
 namespace {
@@ -20,12 +20,9 @@ FitOptions options_of(GrowthRule rule, int max_threads) {
   return options;
 }
 
-// With more inputs the choice among them takes minutes, and a sum seconds.
-constexpr Eigen::Index most_inputs = 100;
-
 // A sum has no split that sends several levels to one side, and no mean of a leaf for an empty cell.
 bool may_have_tree(const BoostingData& data) {
-  return data.x.cols() <= most_inputs && !data.x.hasNaN() &&
+  return !data.regime.rules_of_tree.empty() && !data.x.hasNaN() &&
          std::ranges::none_of(data.inputs, &InputColumn::is_categorical);
 }
 
@@ -110,13 +107,13 @@ std::optional<BoostedTree> translated(const Model& model, const BoostingData& da
   return tree;
 }
 
-TrainingData rows_of(const BoostingData& data, const Eigen::VectorXd& output) {
-  TrainingData rows;
-  rows.inputs = data.x;
-  rows.outputs = output;
-  rows.weights = data.rows.weights;
-  rows.may_have_codes = false;
-  return rows;
+// The rows for the preparation of a fit.
+GivenRows rows_of(const BoostingData& data, const Eigen::VectorXd& output) {
+  return {.inputs = {data.x}, .outputs = {output}, .weights = data.rows.weights, .may_have_codes = false};
+}
+
+FitResult fit_tree(const GivenRows& rows, const FitOptions& options, Work& work) {
+  return fit(prepare(rows, options, work), work);
 }
 
 // A fit with what another one of the same inputs chose, and nothing more to choose.
@@ -154,24 +151,15 @@ std::optional<Eigen::VectorXd> residuals_of(const Model& model, const BoostingDa
   return (output - values_of({*tree}, data.rows))(rows.held_out);
 }
 
-HoldOut part_apart(const std::vector<int>& parts, int part) {
-  HoldOut rows;
-  for (int row = 0; row < std::ssize(parts); ++row) {
-    (parts[row] == part ? rows.held_out : rows.train).push_back(row);
-  }
-  return rows;
-}
-
 }  // namespace
 
 std::optional<OneTree> one_tree(const BoostingData& data, const Eigen::VectorXd& output, int max_threads, Work& work) {
   if (!may_have_tree(data)) return std::nullopt;
-  TrainingData rows_in_folds = rows_of(data, output);
+  GivenRows rows_in_folds = rows_of(data, output);
   rows_in_folds.groups.assign(data.parts.begin(), data.parts.end());
-  const FitResult fitted = fit(rows_in_folds, options_of(GrowthRule::ra, max_threads), work.progress());
-  std::vector<int> all(output.size());
-  std::iota(all.begin(), all.end(), 0);
-  const std::optional<BoostedTree> tree = translated(fitted.model, data, all, max_threads);
+  const FitOptions options = options_of(data.regime.rules_of_tree.front(), max_threads);
+  const FitResult fitted = fit_tree(rows_in_folds, options, work);
+  const std::optional<BoostedTree> tree = translated(fitted.model, data, all_rows(output.size()), max_threads);
   if (!tree) return std::nullopt;
   OneTree result{.tree = *tree, .residuals = output};
   for (std::size_t fold = 0; fold < fitted.intervals.models().size(); ++fold) {
@@ -186,15 +174,16 @@ std::optional<OneTree> one_tree(const BoostingData& data, const Eigen::VectorXd&
 std::optional<TriedTree> try_tree(const BoostingData& data, const Eigen::VectorXd& output, const HoldOut& rows,
                                   std::span<const GrowthRule> rules, int max_threads, Work& work) {
   if (!may_have_tree(data)) return std::nullopt;
-  TrainingData divided = rows_of(data, output);
-  divided.held_out.assign(rows.held_out.begin(), rows.held_out.end());
+  GivenRows divided = rows_of(data, output);
+  divided.held_out.resize(output.size(), false);
+  for (const int row : rows.held_out) divided.held_out[row] = true;
   const Eigen::VectorXd weights = data.rows.weights(rows.held_out);
   std::optional<TriedTree> best;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < rules.size(); ++k) {
     Work part(work, work.left() / static_cast<double>(rules.size() - k));
     const FitOptions options = options_of(rules[k], max_threads);
-    const FitResult fitted = fit(divided, options, part.progress());
+    const FitResult fitted = fit_tree(divided, options, part);
     const auto residuals = residuals_of(fitted.model, data, output, rows, max_threads);
     if (!residuals) continue;
     const double squares = residuals->cwiseAbs2().dot(weights);
@@ -207,10 +196,8 @@ std::optional<TriedTree> try_tree(const BoostingData& data, const Eigen::VectorX
 
 std::optional<BoostedTree> tree_of_all(const BoostingData& data, const Eigen::VectorXd& output, const TriedTree& tried,
                                        Work& work) {
-  const FitResult fitted = fit(rows_of(data, output), tried.options, work.progress());
-  std::vector<int> all(output.size());
-  std::iota(all.begin(), all.end(), 0);
-  return translated(fitted.model, data, all, tried.options.max_threads);
+  const FitResult fitted = fit_tree(rows_of(data, output), tried.options, work);
+  return translated(fitted.model, data, all_rows(output.size()), tried.options.max_threads);
 }
 
 SumPart part_of(const BoostedTree& tree, const Eigen::VectorXd& output, const BinnedRows& rows) {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <span>
 
+#include "boosted/boosting.hpp"
 #include "boosted/boosting_data.hpp"
-#include "boosted/sum_parts.hpp"
 #include "llmt/options.hpp"
 #include "llmt/progress.hpp"
 
@@ -18,10 +18,10 @@ struct OneTree {
   Eigen::VectorXd residuals;  ///< of every row, of the tree of its fold, which was fitted without it
 };
 
-/// The tree that fit() makes by the rule RA with at most 24 leaves, BoostingData::parts being its folds. It is written
-/// as a tree of a sum without its guards. In their place a leaf is held to the values of its own model in the rows that
-/// reach it, widened by a tenth. Nothing where a sum cannot say it: categorical inputs, empty cells, products in local
-/// models, or more than `most_leaf_slopes` slopes in a leaf; nor with more than 100 inputs.
+/// The tree that fit() makes by the regime's rule with at most 24 leaves, BoostingData::parts being its folds. It is
+/// written as a tree of a sum without its guards. In their place a leaf is held to the values of its own model in the
+/// rows that reach it, widened by a tenth. Nothing where a sum cannot say it: categorical inputs, empty cells, products
+/// in local models, or more than `most_leaf_slopes` slopes in a leaf; nor where the regime has no rules for it.
 std::optional<OneTree> one_tree(const BoostingData& data, const Eigen::VectorXd& output, int max_threads, Work& work);
 
 /// A tree of some rows, chosen by others.

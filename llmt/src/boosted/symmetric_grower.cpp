@@ -11,9 +11,6 @@
 namespace llmt {
 namespace {
 
-// With more rows splits are found on a part of them, another one for each tree; leaves are estimated on all.
-constexpr Eigen::Index most_searched = 250000;
-
 constexpr Eigen::Index block_of_search = 8192;
 
 void add_to_leaves(const std::array<HistogramOf, features_at_once>& histograms, std::size_t features,
@@ -126,8 +123,8 @@ SymmetricGrower::SymmetricGrower(const BinnedRows& rows, Eigen::Index count, Tre
 
 void SymmetricGrower::begin(const Eigen::VectorXd& residuals, bool is_searching) {
   levels_.clear();
-  features_.clear();
-  const Eigen::Index parts = (count_ + most_searched - 1) / most_searched;
+  features_ = {};
+  const Eigen::Index parts = (count_ - 1) / options_.searched + 1;
   const Eigen::Index part = trees_++ % parts;
   first_ = part * count_ / parts;
   const Eigen::Index count = (part + 1) * count_ / parts - first_;
@@ -158,33 +155,17 @@ SplitChoice SymmetricGrower::best_of_features(std::span<const int> features) con
   add_to_leaves(histograms, features.size(), leaves_.data(), terms_.data(), terms_.size());
   SplitChoice best;
   for (std::size_t k = 0; k < features.size(); ++k) {
-    const int feature = features[k];
-    const BinnedFeature& column = rows_.features[feature];
-    const bool slopes = std::ssize(features_) < options_.slopes || std::ranges::count(features_, feature) > 0;
-    for (const bool missing_left : {false, true}) {
-      if (missing_left && !column.has_missing) continue;
-      Gains gains = {};
-      for (std::size_t leaf = 0; leaf < num_leaves; ++leaf) {
-        if (has_rows_[leaf]) {
-          add_gains(gains, column, sums[k][leaf], units_, options_.ridges, slopes, missing_left);
-        }
-      }
-      best.take_if_better(best_of_gains(column, feature, gains, missing_left));
+    FeatureGains gains(rows_, features[k]);
+    for (std::size_t leaf = 0; leaf < num_leaves; ++leaf) {
+      if (has_rows_[leaf]) gains.add(sums[k][leaf], units_, options_.ridges, may_have_slope(features[k]));
     }
+    best.take_if_better(gains.best());
   }
   return best;
 }
 
-SplitChoice SymmetricGrower::best_split(const std::vector<int>& features) const {
-  std::vector<SplitChoice> of_some((features.size() + features_at_once - 1) / features_at_once);
-  parallel_for(std::ssize(of_some), max_threads_, [&](Eigen::Index k) {
-    const std::size_t first = k * features_at_once;
-    const std::size_t count = std::min(features_at_once, features.size() - first);
-    of_some[k] = best_of_features(std::span(features).subspan(first, count));
-  });
-  SplitChoice best;
-  for (const SplitChoice& one : of_some) best.take_if_better(one);
-  return best;
+bool SymmetricGrower::may_have_slope(int feature) const {
+  return std::ssize(features_) < options_.slopes || std::ranges::count(features_, feature) > 0;
 }
 
 void SymmetricGrower::split(SplitChoice choice, bool is_refined, bool is_last) {
@@ -207,7 +188,7 @@ void SymmetricGrower::split(SplitChoice choice, bool is_refined, bool is_last) {
                     choice.missing_left);
         if (window.first <= window.last) list_window(sums.in_window, column.cells, block, window);
       });
-  const bool has_slope = std::ssize(features_) < options_.slopes || std::ranges::count(features_, choice.feature) > 0;
+  const bool has_slope = may_have_slope(choice.feature);
   std::vector<SumsOfLeaf> sums(num_leaves);
   for (std::size_t leaf = 0; leaf < num_leaves; ++leaf) {
     const RegionSums* const of_leaf = &regions.sums[num_regions * leaf];
@@ -262,7 +243,8 @@ void SymmetricGrower::move_rows(const SplitChoice& level, std::span<const SideMo
 GrowingTree SymmetricGrower::grow(const Eigen::VectorXd& residuals, Random& random) {
   begin(residuals, true);
   for (int level = 0; level < options_.depth; ++level) {
-    const SplitChoice best = best_split(some_features(rows_.features.size(), options_.columns, random));
+    const SplitChoice best = best_of_all(some_features(rows_.features.size(), options_.columns, random), max_threads_,
+                                         [&](std::span<const int> some) { return best_of_features(some); });
     if (best.feature >= 0) split(best, true, level + 1 == options_.depth);
   }
   fit_leaves(residuals);
@@ -310,15 +292,7 @@ int SymmetricGrower::add_node(GrowingTree& tree, std::size_t level, std::size_t 
   const auto begin = has_rows_.begin() + static_cast<std::ptrdiff_t>(first);
   if (level == levels_.size() || std::find(begin, begin + static_cast<std::ptrdiff_t>(leaves), true) ==
                                      begin + static_cast<std::ptrdiff_t>(leaves)) {
-    const LeafModel& model = models_[first];
-    GrowingNode& leaf = tree.back();
-    leaf.low = model.low;
-    leaf.high = model.high;
-    leaf.model.constant = model.constant;
-    for (std::size_t j = 0; j < features_.size(); ++j) {
-      leaf.model.features.push_back(features_[j]);
-      leaf.model.slopes.push_back(model.slopes[j]);
-    }
+    tree.back().model = {models_[first], features_};
     return number;
   }
   const int left = add_node(tree, level + 1, first);

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "boosted/growing_tree.hpp"
-#include "boosted/leaf_model.hpp"
 #include "boosted/refine_split.hpp"
 
 namespace llmt {
@@ -35,7 +34,7 @@ class SymmetricGrower {
 
  private:
   void begin(const Eigen::VectorXd& residuals, bool is_searching);
-  SplitChoice best_split(const std::vector<int>& features) const;
+  bool may_have_slope(int feature) const;
   SplitChoice best_of_features(std::span<const int> features) const;
   void split(SplitChoice choice, bool is_refined, bool is_last);
   void move_rows(const SplitChoice& level, std::span<const SideModel> sides, bool is_packed);
@@ -50,7 +49,7 @@ class SymmetricGrower {
   const int max_threads_;
   // The tree that grows.
   std::vector<SplitChoice> levels_;
-  std::vector<int> features_;      // with slopes, which all leaves have
+  SlopeFeatures features_;         // with slopes, which all leaves have
   std::vector<LeafModel> models_;  // of the paths, then of the leaves
   std::vector<bool> has_rows_;     // each of them
   // The rows that are searched for splits, a part of all.

@@ -19,10 +19,10 @@ constexpr Eigen::Index block_of_leaves = 16384;
 
 // The values of the features that have slopes, then of any other one, whose slopes are 0: `size` in all.
 template <int size>
-std::array<const float*, size> columns_of(const BinnedRows& rows, const std::vector<int>& features) {
+std::array<const float*, size> columns_of(const BinnedRows& rows, const SlopeFeatures& features) {
   std::array<const float*, size> columns;
   for (int j = 0; j < size; ++j) {
-    const int feature = j < std::ssize(features) ? features[j] : 0;
+    const int feature = std::cmp_less(j, features.size()) ? features[j] : 0;
     columns[j] = rows.features[feature].values.data();
   }
   return columns;

@@ -195,7 +195,8 @@ void expect_ridges(const llmt::GrowingTree& tree, const Rows& rows, int index, c
   const llmt::GrowingNode& node = tree[index];
   if (node.feature < 0) {
     if (held.empty()) return;
-    const Path expected = ridge_about(path, rows, held, node.model.features, ridges);
+    const Path expected =
+        ridge_about(path, rows, held, {node.model.features.begin(), node.model.features.end()}, ridges);
     EXPECT_NEAR(node.model.constant, expected.constant, 1e-9);
     for (std::size_t k = 0; k < node.model.features.size(); ++k) {
       EXPECT_NEAR(node.model.slopes[k], expected.slope(node.model.features[k]), 1e-9);

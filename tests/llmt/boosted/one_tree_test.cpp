@@ -34,8 +34,6 @@ llmt::TrainingData smooth(Eigen::Index rows, Eigen::Index inputs, double noise, 
   return data;
 }
 
-constexpr std::array by_ra = {llmt::GrowthRule::ra};
-
 double rmse(const Eigen::VectorXd& errors) {
   return std::sqrt(errors.squaredNorm() / static_cast<double>(errors.size()));
 }
@@ -92,7 +90,7 @@ TEST(OneTree, LeavesResidualsOfRowsThatItHasNotSeen) {
   ASSERT_TRUE(one.has_value());
   EXPECT_NEAR(one->residuals(17), 1000.0, 10.0);
   const llmt::HoldOut& apart = rows.hold_outs[rows.parts[17]];
-  const auto tried = llmt::try_tree(rows, data.outputs.col(0), apart, by_ra, 1, work);
+  const auto tried = llmt::try_tree(rows, data.outputs.col(0), apart, llmt::by_ra, 1, work);
   ASSERT_TRUE(tried.has_value());
   ASSERT_EQ(tried->residuals.size(), std::ssize(apart.held_out));
   EXPECT_NEAR(tried->residuals.cwiseAbs().maxCoeff(), 1000.0, 10.0);
@@ -106,7 +104,7 @@ TEST(OneTree, OfAllRowsIsMadeAsTheTriedOne) {
   const llmt::Progress nobody;
   llmt::Work work(nobody);
   const llmt::HoldOut& apart = rows.hold_outs.front();
-  const auto tried = llmt::try_tree(rows, rows.y.col(0), apart, by_ra, 1, work);
+  const auto tried = llmt::try_tree(rows, rows.y.col(0), apart, llmt::by_ra, 1, work);
   ASSERT_TRUE(tried.has_value());
   EXPECT_LT(std::ssize(tried->options.split_inputs), 10);
   EXPECT_GT(tried->options.max_leaves, 5);

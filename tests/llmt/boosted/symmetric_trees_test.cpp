@@ -75,10 +75,11 @@ TEST(SymmetricGrower, FindsTheSplitsOfManyRowsOnAPartOfThem) {
   for (double& value : z) value = random.normal();
   llmt::BinnedRows rows;
   rows.weights = Eigen::VectorXd::Ones(count);
-  rows.features = {llmt::bin_feature({}, z, rows.weights)};
+  rows.features.push_back(llmt::bin_feature({}, z, rows.weights));
   llmt::TreeOptions options;
   options.depth = 1;
   options.columns = 1.0;
+  options.searched = 250000;
   const Eigen::VectorXd y = (z.array() > 0.75).select(3.0 - 2.0 * z.array(), 0.5 * z.array());
   llmt::SymmetricGrower grower(rows, count, options, 1);
   llmt::SymmetricGrower threads(rows, count, options, 2);

@@ -1,12 +1,9 @@
-#include "boosted/blend.hpp"
+#include "boosted/average.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numeric>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "boosted/linear_start.hpp"
@@ -14,6 +11,8 @@
 
 namespace llmt {
 namespace {
+
+constexpr const char* name_of_tree = "one tree";
 
 struct Variant {
   std::string name;
@@ -31,15 +30,24 @@ std::vector<Variant> variants_of(const RoundOptions& usual, bool is_rate_given, 
   return variants;
 }
 
+SumPart boosted(const BoostingData& data, const Eigen::VectorXd& output, const Variant& variant, const HoldOut& rows,
+                Random& random, Work& work) {
+  SumPart part{.rate = variant.rounds.rate};
+  if (variant.has_start) part.start = linear_start(data.rows, output, rows.train);
+  part.rounds = boost(data.rows, output - values_of(part.start, data.rows), rows.train, rows.held_out, {},
+                      variant.rounds, random, work);
+  return part;
+}
+
 // A variant in all folds.
 struct Folds {
   std::vector<double> rounds;                      // that were best in each
   std::vector<std::vector<Eigen::VectorXd>> path;  // residuals of its held-out rows, by rounds
 
-  double mean_rounds(std::size_t without) const {
+  double mean_rounds(std::optional<std::size_t> without = {}) const {
     double sum = 0.0;
     for (std::size_t k = 0; k < rounds.size(); ++k) sum += k == without ? 0.0 : rounds[k];
-    return sum / static_cast<double>(rounds.size() - (without < rounds.size() ? 1 : 0));
+    return sum / static_cast<double>(rounds.size() - (without ? 1 : 0));
   }
 
   // With as many rounds as the other folds ask for, since its own would flatter.
@@ -49,60 +57,22 @@ struct Folds {
   }
 };
 
-constexpr std::size_t no_fold = std::numeric_limits<std::size_t>::max();
-
-class BlendFit {
- public:
-  BlendFit(const BoostingData& data, const Eigen::VectorXd& output, Random& random)
-      : data_(data), output_(output), random_(random) {
-    all_.resize(output.size());
-    std::iota(all_.begin(), all_.end(), 0);
+Folds in_folds(const BoostingData& data, const Eigen::VectorXd& output, Variant variant, Random& random, Work& work) {
+  variant.rounds.keep_path = true;
+  Folds folds;
+  for (const HoldOut& rows : data.hold_outs) {
+    Work part(work, work.left() / static_cast<double>(data.hold_outs.size() - folds.rounds.size()));
+    Rounds rounds = boosted(data, output, variant, rows, random, part).rounds;
+    folds.rounds.push_back(static_cast<double>(rounds.trees.size()));
+    folds.path.push_back(std::move(rounds.path));
   }
-
-  Folds in_folds(const Variant& variant, Work& work) {
-    Folds folds;
-    for (const HoldOut& rows : data_.hold_outs) {
-      Work part(work, work.left() / static_cast<double>(data_.hold_outs.size() - folds.rounds.size()));
-      RoundOptions options = variant.rounds;
-      options.keep_path = true;
-      const Rounds rounds = boost(data_.rows, left_of(start_of(variant, rows.train)), rows.train, rows.held_out, {},
-                                  options, random_, part);
-      folds.rounds.push_back(static_cast<double>(rounds.trees.size()));
-      folds.path.push_back(rounds.path);
-    }
-    return folds;
-  }
-
-  SumPart on_all(const Variant& variant, double rounds, Work& work) {
-    SumPart part{.rate = variant.rounds.rate, .rounds = {}, .start = start_of(variant, all_)};
-    RoundOptions options = variant.rounds;
-    options.most_rounds = static_cast<int>(std::ceil(more_trees * std::round(rounds)));
-    part.rounds = boost(data_.rows, left_of(part.start), all_, {}, {}, options, random_, work);
-    return part;
-  }
-
- private:
-  std::vector<BoostedTree> start_of(const Variant& variant, const std::vector<int>& train) const {
-    return variant.has_start ? linear_start(data_.rows, output_, train) : std::vector<BoostedTree>();
-  }
-  Eigen::VectorXd left_of(const std::vector<BoostedTree>& start) const {
-    return output_ - values_of(start, data_.rows);
-  }
-
-  const BoostingData& data_;
-  const Eigen::VectorXd& output_;
-  Random& random_;
-  std::vector<int> all_;
-};
-
-std::vector<int> all_of(Eigen::Index count) {
-  std::vector<int> all(count);
-  std::iota(all.begin(), all.end(), 0);
-  return all;
+  return folds;
 }
 
-double rmse_of(const Eigen::VectorXd& residuals, const Eigen::VectorXd& weights) {
-  return std::sqrt(residuals.cwiseAbs2().dot(weights) / weights.sum());
+SumPart on_all(const BoostingData& data, const Eigen::VectorXd& output, Variant variant, double rounds, Random& random,
+               Work& work) {
+  variant.rounds.most_rounds = static_cast<int>(std::ceil(more_trees * std::round(rounds)));
+  return boosted(data, output, variant, {all_rows(output.size()), {}}, random, work);
 }
 
 double train_rmse_of(const std::vector<SumPart>& parts, const Eigen::VectorXd& weights) {
@@ -110,8 +80,6 @@ double train_rmse_of(const std::vector<SumPart>& parts, const Eigen::VectorXd& w
   for (const SumPart& part : parts) residuals += part.share * part.rounds.residuals;
   return rmse_of(residuals, weights);
 }
-
-constexpr const char* name_of_tree = "one tree";
 
 }  // namespace
 
@@ -145,74 +113,73 @@ Eigen::VectorXd shares_of(const Eigen::MatrixXd& residuals, const Eigen::VectorX
   return best;
 }
 
-Blend blend(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, bool is_rate_given,
-            Random& random, Work& work) {
+Average average(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, bool is_rate_given,
+                Random& random, Work& work) {
   Work growing(work, 0.3);
   const std::optional<OneTree> tree = one_tree(data, output, usual.max_threads, growing);
   const std::vector<Variant> variants = variants_of(usual, is_rate_given, tree.has_value());
-  BlendFit fit(data, output, random);
+  const Eigen::VectorXd& weights = data.rows.weights;
   std::vector<Folds> folds;
   Eigen::MatrixXd residuals(output.size(), std::ssize(variants) + (tree ? 1 : 0));
-  Blend result;
+  Average result;
   Work searching(work, 0.7 * work.left());
   for (const Variant& variant : variants) {
     Work part(searching, searching.left() / static_cast<double>(variants.size() - folds.size()));
-    folds.push_back(fit.in_folds(variant, part));
-    auto column = residuals.col(std::ssize(folds) - 1);
+    auto column = residuals.col(std::ssize(folds));
+    folds.push_back(in_folds(data, output, variant, random, part));
     for (std::size_t k = 0; k < data.hold_outs.size(); ++k)
       column(data.hold_outs[k].held_out) = folds.back().residuals(k);
-    result.variants.push_back({.name = variant.name, .rmse = rmse_of(column, data.rows.weights)});
+    result.variants.push_back({variant.name, rmse_of(column, weights)});
   }
   if (tree) {
     residuals.rightCols(1) = tree->residuals;
-    result.variants.push_back({.name = name_of_tree, .rmse = rmse_of(tree->residuals, data.rows.weights)});
+    result.variants.push_back({name_of_tree, rmse_of(tree->residuals, weights)});
   }
   result.residuals.resize(output.size());
   for (const HoldOut& rows : data.hold_outs) {  // with the shares that the other folds ask for
-    const Eigen::VectorXd shares = shares_of(residuals, data.rows.weights, rows.train);
+    const Eigen::VectorXd shares = shares_of(residuals, weights, rows.train);
     result.residuals(rows.held_out) = residuals(rows.held_out, Eigen::all) * shares;
   }
-  result.rmse = rmse_of(result.residuals, data.rows.weights);
-  const Eigen::VectorXd shares = shares_of(residuals, data.rows.weights, all_of(output.size()));
+  result.rmse = rmse_of(result.residuals, weights);
+  const Eigen::VectorXd shares = shares_of(residuals, weights, all_rows(output.size()));
   for (std::size_t k = 0; k < result.variants.size(); ++k) {
     Work part(work, work.left() / static_cast<double>(result.variants.size() - k));
     const double share = shares(static_cast<Eigen::Index>(k));
     if (share == 0.0) continue;
     result.variants[k].share = share;
-    result.parts.push_back(k < variants.size() ? fit.on_all(variants[k], folds[k].mean_rounds(no_fold), part)
+    result.parts.push_back(k < variants.size() ? on_all(data, output, variants[k], folds[k].mean_rounds(), random, part)
                                                : part_of(tree->tree, output, data.rows));
     result.parts.back().share = share;
   }
-  result.train_rmse = train_rmse_of(result.parts, data.rows.weights);
+  result.train_rmse = train_rmse_of(result.parts, weights);
   return result;
 }
 
-Blend with_one_tree(const BoostingData& data, const Eigen::VectorXd& output, NamedSum sum,
-                    const Eigen::VectorXd& residuals, std::span<const GrowthRule> rules, int max_threads, Work& work) {
+Average with_one_tree(const BoostingData& data, const Eigen::VectorXd& output, Average sum, int max_threads,
+                      Work& work) {
   const HoldOut& rows = data.hold_outs.front();
   const Eigen::VectorXd weights = data.rows.weights(rows.held_out);
-  Blend result{.parts = {}, .variants = {}, .residuals = residuals, .rmse = rmse_of(residuals, weights)};
-  result.variants.push_back({sum.name, result.rmse, 1.0});
-  result.parts.push_back(std::move(sum.sum));
-  result.train_rmse = train_rmse_of(result.parts, data.rows.weights);
   Work trying(work, 0.2);
-  const auto tried = try_tree(data, output, rows, rules, max_threads, trying);
-  if (!tried) return result;
-  result.variants.push_back({name_of_tree, rmse_of(tried->residuals, weights), 0.0});
-  if (result.variants.back().rmse >= result.rmse) return result;
+  const auto tried = try_tree(data, output, rows, data.regime.rules_of_tree, max_threads, trying);
+  if (!tried) return sum;
+  sum.variants.push_back({name_of_tree, rmse_of(tried->residuals, weights)});
+  if (sum.variants.back().rmse >= sum.rmse) return sum;
   Work growing(work, work.left());
   const std::optional<BoostedTree> tree = tree_of_all(data, output, *tried, growing);
-  if (!tree) return result;
+  if (!tree) return sum;
   Eigen::MatrixXd both(weights.size(), 2);
-  both << residuals, tried->residuals;
-  const Eigen::VectorXd shares = shares_of(both, weights, all_of(weights.size()));
-  result.residuals = both * shares;
-  result.rmse = rmse_of(result.residuals, weights);
-  result.parts.push_back(part_of(*tree, output, data.rows));
-  for (Eigen::Index k = 0; k < 2; ++k) result.variants[k].share = result.parts[k].share = shares(k);
-  std::erase_if(result.parts, [](const SumPart& part) { return part.share == 0.0; });
-  result.train_rmse = train_rmse_of(result.parts, data.rows.weights);
-  return result;
+  both << sum.residuals, tried->residuals;
+  const Eigen::VectorXd shares = shares_of(both, weights, all_rows(weights.size()));
+  sum.residuals = both * shares;
+  sum.rmse = rmse_of(sum.residuals, weights);
+  sum.parts.push_back(part_of(*tree, output, data.rows));
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    sum.parts[k].share = shares(k);
+    sum.variants.end()[k - 2].share = shares(k);
+  }
+  std::erase_if(sum.parts, [](const SumPart& part) { return part.share == 0.0; });
+  sum.train_rmse = train_rmse_of(sum.parts, data.rows.weights);
+  return sum;
 }
 
 }  // namespace llmt

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "boosted/blend.hpp"
+#include "boosted/average.hpp"
 #include "boosted/linear_start.hpp"
 #include "llmt/boosted.hpp"
 #include "llmt/fit.hpp"

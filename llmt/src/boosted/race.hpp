@@ -1,0 +1,26 @@
+/// \file
+/// Variants of the trees, compared on held-out rows after a few rounds.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "boosted/boosting.hpp"
+#include "boosted/boosting_data.hpp"
+
+namespace llmt {
+
+/// How a sum is boosted.
+struct SumPlan {
+  RoundOptions rounds;
+  std::string name;                         ///< of the variant
+  BinnedRows rows;                          ///< with pairs of features, if these were better
+  std::vector<BoostVariant> compared = {};  ///< for the standardised output; empty: there was no race
+};
+
+/// The winner among symmetric trees with the options `usual`, free ones, the better of them with pairs of features, and
+/// the same with soft trees, see "The race" in docs/algorithms/boosting.md. `output`: standardised.
+SumPlan race(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, std::uint64_t seed,
+             Work& work);
+
+}  // namespace llmt
