@@ -46,6 +46,15 @@ RoundOptions usual_rounds(const BoostingData& data, const BoostOptions& options)
           .max_threads = options.max_threads};
 }
 
+// What the sum leaves in each row.
+Eigen::VectorXd left_by(const Rounds& rounds, double rate, const BinnedRows& rows, const Eigen::VectorXd& output) {
+  Eigen::VectorXd left = output.array() - rounds.base;
+  for (Eigen::Index i = 0; i < left.size(); ++i) {
+    for (const GrowingTree& tree : rounds.trees) left(i) -= rate * value_at(tree, rows, i);
+  }
+  return left;
+}
+
 // The sum that one set of held-out rows stops, and one tree beside it.
 Average stopped(const BoostingData& data, const Eigen::VectorXd& output, const SumPlan& plan, Random& random,
                 BoostSummary& summary, Work& work) {
@@ -67,6 +76,8 @@ Average stopped(const BoostingData& data, const Eigen::VectorXd& output, const S
     if (regime.races && more.tree.symmetric) kept = std::move(rounds.trees);
     Work refitting(work, (is_tree_tried ? 0.7 : 1.0) * work.left());
     rounds = boost(plan.rows, output, all_rows(output.size()), {}, kept, more, random, refitting);
+  } else if (is_tree_tried) {
+    rounds.residuals = left_by(rounds, plan.rounds.rate, plan.rows, output);  // a tree beside it is of all rows
   }
   result.train_rmse = rounds.train_rmse;
   result.parts.push_back({.rate = plan.rounds.rate, .rounds = std::move(rounds)});

@@ -153,6 +153,23 @@ TEST(FitBoosted, TakesOneTreeWhereItIsBetter) {
   EXPECT_GT(std::hypot(error, 0.05), 0.8 * summary.rmse);
 }
 
+// Groups may be held out that are too few rows for the sum to be fitted to all; the tree beside it is.
+TEST(FitBoosted, SaysTheErrorOfAllRowsWhereOneTreeIsBesideASumOfSome) {
+  llmt::TrainingData data = smooth(700, 4, 0.05, 5);
+  for (int row = 0; row < 700; ++row) data.groups.push_back(row < 20 ? 0 : 1 + row % 4);
+  llmt::BoostOptions options{.max_rounds = 30};
+  llmt::BoostResult fitted = llmt::fit_boosted(data, options);
+  for (; fitted.summaries[0].held_out != 20; ++options.seed) {
+    ASSERT_LT(options.seed, 50U);
+    fitted = llmt::fit_boosted(data, options);
+  }
+  const llmt::BoostSummary& summary = fitted.summaries[0];
+  EXPECT_EQ(summary.rows, 680);
+  ASSERT_GT(summary.compared[1].share, 0.0);
+  ASSERT_GT(summary.compared[0].share, 0.0);
+  EXPECT_NEAR(summary.train_rmse, rmse(fitted.model.predict(data.inputs).col(0) - data.outputs.col(0)), 1e-5);
+}
+
 // The function of two inputs is another one on either side of a step in a third: RA does not see the step.
 TEST(OneTree, IsGrownByTheRuleOfTheSmallerError) {
   llmt::TrainingData data = smooth(700, 3, 0.0, 9);
