@@ -8,8 +8,9 @@
 #include <vector>
 
 #include "llmt/robotics/robot_file.hpp"
+#include "report/document/document_text.hpp"
+#include "report/robot/calibration_document.hpp"
 #include "report/robot/calibration_run.hpp"
-#include "report/robot/measurement_text.hpp"
 #include "report/robot/of_calibration.hpp"
 #include "robot/commands.hpp"
 #include "robot/corrected_file.hpp"
@@ -51,6 +52,7 @@ std::map<std::string, double> priors_of(const std::vector<std::string>& texts) {
 
 void calibrate_command(CalibrateArguments arguments) {
   report::CalibrationTask& task = arguments.task;
+  task.page = arguments.reports.wanted();
   robotics::ReportOptions& options = task.options;
   options.calibration.priors = priors_of(arguments.priors);
   options.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
@@ -72,17 +74,11 @@ void calibrate_command(CalibrateArguments arguments) {
     written = save_corrected(run.report.best(), arguments.output, {task.robot_file, arguments.links});
   }
   std::string reports;
-  if (arguments.reports.wanted()) {
-    reports = write_reports(
-        arguments.reports,
-        report::calibration_report({task.robot_file, task.data_file, run.nominal, report::points_of(run.measurements),
-                                    run.report, run.task.options, run.input_mistakes}));
-  }
-  const report::CalibrationFacts facts = run.facts(arguments.output);
+  if (task.page) reports = write_reports(arguments.reports, report::calibration_page(run));
   if (arguments.json) {
-    print_json(report::calibration_json(facts));
+    print_json(report::calibration_json(run, arguments.output));
   } else {
-    print(report::calibration_text(facts, output_width()));
+    print(report::document_text(report::calibration_document(run), output_width()));
     if (!written.names.empty()) print(fmt::format("Written: {}\n", fmt::join(written.names, ", ")));
     print(written.beside_urdf);
     print(reports);

@@ -44,7 +44,7 @@ void compensate_command(const CompensateArguments& arguments) {
     };
   }
   const report::CompensationRun run =
-      report::run_compensation(robot, robotics::read_targets(arguments.targets, robot.robot, mark, map), task, warn);
+      report::run_compensation(robot, robotics::read_targets(arguments.targets, robot.robot, mark, map), task, warn_of);
   const std::string csv = with_decimal_mark(report::commands_csv(run), mark);
   if (!arguments.output.empty()) write_file(arguments.output, csv);
   if (arguments.json) {
@@ -55,9 +55,7 @@ void compensate_command(const CompensateArguments& arguments) {
   } else {
     print(report::compensation_text(run, arguments.output) + "\n");
   }
-  if (const std::string refusal = report::compensation_refusal(run); !refusal.empty()) {
-    throw std::runtime_error(refusal);
-  }
+  if (const auto refusal = report::compensation_refusal(run)) throw std::runtime_error(refusal->words({}));
 }
 
 }  // namespace

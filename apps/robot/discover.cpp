@@ -49,9 +49,9 @@ void discover_command(DiscoverArguments arguments) {
   options.progress = bar.callback();
   arguments.task.robot_file = arguments.robot;
   const report::DiscoveryRun run =
-      report::run_discovery(described, data, read_test, arguments.task, [&](const std::string& sentence) {
+      report::run_discovery(described, data, read_test, arguments.task, [&](const Finding& finding) {
         bar.clear();
-        warn(sentence);
+        warn_of(finding);
       });
   bar.clear();
   SavedRobot written;

@@ -78,7 +78,7 @@ void export_command(const ExportArguments& arguments) {
     warn("The table holds the geometry alone: effects and correction are left out; llmt-robot compensate has them");
   }
   if (const std::string uncertain = report::uncertain_text(robot); !uncertain.empty()) {
-    warn(report::uncertain_values_warning(uncertain));
+    warn_of(report::uncertain_values_warning(uncertain));
   }
 }
 

@@ -14,7 +14,7 @@ llmt::robotics::Robot llmt::apps::read_description(const std::string& robot, con
 }
 
 llmt::robotics::CorrectedRobot llmt::apps::read_arm(const std::string& path, const robotics::UrdfLinks& links) {
-  return report::arm_alone(path, robotics::read_corrected_robot(path, links), warn);
+  return report::arm_alone(path, robotics::read_corrected_robot(path, links), warn_of);
 }
 
 void llmt::apps::add_urdf_links(CLI::App& command, robotics::UrdfLinks& links) {

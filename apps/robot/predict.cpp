@@ -32,7 +32,7 @@ void predict_command(const PredictArguments& arguments) {
   const DecimalMark mark = map.decimal.value_or(arguments.mark);
   const auto [given, joint_columns] = robotics::read_pose_table(arguments.poses, robot.robot, mark, map);
   const robotics::Measurements predicted =
-      report::predicted_table(arguments.robot, robot, given, map.orientation, warn);
+      report::predicted_table(arguments.robot, robot, given, map.orientation, warn_of);
   const std::string csv = with_decimal_mark(robotics::to_csv(predicted, robot.robot, joint_columns), mark);
   if (arguments.output.empty()) {
     print_bytes(csv);

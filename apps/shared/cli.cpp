@@ -238,4 +238,6 @@ void warn(const std::string& text) {
   write_stderr(line + "\n");
 }
 
+void warn_of(const Finding& finding) { warn((finding.is_mistake ? "WARNING: " : "") + finding.words({})); }
+
 }  // namespace llmt::apps

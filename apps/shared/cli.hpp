@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "llmt/finding.hpp"
 #include "report/text/json.hpp"
 #include "report/text/text.hpp"
 #include "shared/progress.hpp"
@@ -67,5 +68,8 @@ void print_json(const Json& json);
 /// A line on stderr, without_controls() and with line breaks as \x0a. Of a long text (a message may quote what it
 /// refuses) the middle is left out.
 void warn(const std::string& text);
+
+/// warn() in the words of a program, after "WARNING: " if results are probably wrong.
+void warn_of(const Finding& finding);
 
 }  // namespace llmt::apps

@@ -12,7 +12,10 @@
 #include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
+#include "report/document/document_text.hpp"
 #include "report/robot/arms.hpp"
+#include "report/robot/calibration_document.hpp"
+#include "report/robot/calibration_run.hpp"
 #include "report/robot/discovery/discovery_page.hpp"
 #include "report/robot/discovery/of_discovery.hpp"
 #include "report/robot/of_calibration.hpp"
@@ -45,16 +48,32 @@ TEST(RobotReport, CalibrationSaysWhatItGainedOnPosesLeftOut) {
   rb::Robot truth = nominal;
   truth.chain.joints[1].a_mm += 2.0;
   const rb::Measurements data = measured(truth, 60);
-  const rb::ReportOptions options;
-  const rb::CalibrationReport report = rb::report_calibration(nominal, data, options);
-  const std::vector<std::string> none;
-  const Document document = calibration_report({"a/arm.yaml", "b/data.csv", nominal, data, report, options, none});
-  EXPECT_EQ(document.title, "llmt-robot calibrate arm.yaml data.csv");
-  EXPECT_TRUE(document.answer.starts_with("Calibration takes the mean position error from")) << document.answer;
-  EXPECT_NE(document.answer.find("took no part"), std::string::npos) << document.answer;
-  const Json written = to_json(document);
+  const CalibrationRun run = run_calibration(
+      nominal, data, {},
+      {.robot_file = "a/arm.yaml", .data_file = "b/data.csv", .test_file = "", .quality = true, .page = true});
+  const Document page = calibration_page(run);
+  EXPECT_EQ(page.title, "llmt-robot calibrate arm.yaml data.csv");
+  EXPECT_TRUE(page.answer.starts_with("Calibrated: the mean position error falls from")) << page.answer;
+  EXPECT_TRUE(page.answer.ends_with("on poses left out of the fit.")) << page.answer;
+  const Json written = to_json(page);
   EXPECT_EQ(blocks_of_kind(written, "arm"), 2);
   EXPECT_EQ(blocks_of_kind(written, "map"), 2);  // coverage and correlations
+  // A terminal shows the same words and tables, and the learning curve as numbers.
+  const std::string text = document_text(calibration_document(run));
+  EXPECT_EQ(document_text(page), text);
+  EXPECT_TRUE(text.starts_with("b/data.csv: 60 poses of " + nominal.chain.name + "\n" + page.answer + "\n")) << text;
+  const Json curve = calibration_json(run, "")["quality"]["learning_curve"];
+  ASSERT_FALSE(curve.empty());
+  int charts = 0;
+  for (const Json& section : written["sections"]) {
+    for (const Json& each : section["blocks"]) {
+      if (!each.contains("in_words")) continue;
+      ++charts;
+      EXPECT_EQ(each["layers"][0]["x"].size(), curve.size());
+      EXPECT_NEAR(each["layers"][0]["y"][0].get<double>(), curve[0]["held_out_mm"].get<double>(), 1e-5);
+    }
+  }
+  EXPECT_EQ(charts, 1);
 }
 
 TEST(RobotReport, DiscoveryNamesTheEffectAndShowsItsShape) {

@@ -274,7 +274,7 @@ def test_arguments_that_are_missing_or_too_many(arm, measured):
         robotics.calibrate(measured, arm)
     with pytest.raises(ValueError, match="calibrate it first"):
         robotics.check(arm, measured)
-    with pytest.warns(robotics.RobotWarning, match="nominal is not needed and not used"):
+    with pytest.warns(robotics.RobotWarning, match="the targets are poses: nominal is not read"):
         robotics.compensate(arm, measured[["x_mm", "y_mm", "z_mm"]].head(2), nominal=arm)
 
 

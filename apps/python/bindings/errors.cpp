@@ -7,6 +7,7 @@
 #include <exception>
 #include <regex>
 #include <stdexcept>
+#include <string>
 
 #include "llmt/option_fields.hpp"
 #include "llmt/progress.hpp"
@@ -44,6 +45,11 @@ std::string with_arguments(const std::string& message) {
   return text.append(rest, message.cend());
 }
 
+std::string in_words_of_python(const std::string& message) {
+  static const std::regex function("llmt::[A-Za-z_:]+: ");
+  return with_arguments(with_rows(std::regex_replace(message, function, "")));
+}
+
 void translate(const std::exception_ptr& thrown, void* /*payload*/) {
   try {
     std::rethrow_exception(thrown);
@@ -59,11 +65,6 @@ void translate(const std::exception_ptr& thrown, void* /*payload*/) {
 }
 
 }  // namespace
-
-std::string in_words_of_python(std::string_view message) {
-  static const std::regex function("llmt::[A-Za-z_:]+: ");
-  return with_arguments(with_rows(std::regex_replace(std::string(message), function, "")));
-}
 
 void write_or_raise(std::span<const NewFile> files) {
   try {

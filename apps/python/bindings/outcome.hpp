@@ -6,12 +6,14 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
+#include <optional>
 #include <stdexcept>
 #include <string>
-#include <string_view>
+#include <utility>
 #include <vector>
 
-#include "python/bindings/errors.hpp"
+#include "llmt/finding.hpp"
 #include "report/robot/input_checks.hpp"
 #include "report/text/json.hpp"
 
@@ -19,27 +21,33 @@ namespace llmt::python {
 
 namespace nb = nanobind;
 
+/// How Python names arguments and, of a table in memory, rows.
+inline Face python_face(const std::optional<std::string>& text) {
+  return {.before_option = "", .between_words = '_', .switched_on = "=True", .in_memory = text.has_value()};
+}
+
 /// The result of a task: `json`, `text`, `warnings` and more.
 class Outcome {
  public:
+  explicit Outcome(Face face = python_face({})) : face_(std::move(face)) {}
+
   report::Warn warn() {
-    return [this](const std::string& sentence) {
-      constexpr std::string_view mark = "WARNING: ";  // of a line on a terminal
-      warnings_.push_back(in_words_of_python(sentence.substr(sentence.starts_with(mark) ? mark.size() : 0)));
-    };
+    return [this](const Finding& finding) { warnings_.push_back(finding.words(face_)); };
   }
 
+  const Face& face() const { return face_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
 
   nb::dict dict(const std::string& text, const report::Json& json) const {
     nb::dict result;
-    result["text"] = in_words_of_python(text);
+    result["text"] = text;
     result["json"] = json.dump(-1, ' ', false, report::Json::error_handler_t::replace);
     result["warnings"] = warnings_;
     return result;
   }
 
  private:
+  Face face_;
   std::vector<std::string> warnings_;
 };
 

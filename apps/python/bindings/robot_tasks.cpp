@@ -5,6 +5,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <functional>
 #include <stdexcept>
 
@@ -14,8 +15,10 @@
 #include "python/bindings/module.hpp"
 #include "python/bindings/outcome.hpp"
 #include "python/bindings/robots.hpp"
+#include "report/document/document_text.hpp"
 #include "report/document/page.hpp"
 #include "report/robot/arm_tables.hpp"
+#include "report/robot/calibration_document.hpp"
 #include "report/robot/calibration_run.hpp"
 #include "report/robot/check_run.hpp"
 #include "report/robot/compensation_run.hpp"
@@ -68,6 +71,7 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
                                .test_file = test ? test->first : "",
                                .robust = robust,
                                .quality = quality,
+                               .page = page,
                                .new_session = new_session};
   task.options.correct = correct;
   task.options.folds = folds;
@@ -79,6 +83,8 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
   task.options.correction.min_leaf_samples = min_leaf;
   task.options.seed = seed;
   task.options.max_threads = threads;
+  Outcome outcome(python_face(measured.second));
+  task.face = outcome.face();
   std::optional<report::CalibrationRun> run;
   interruptible(
       [&](const Progress& progress) {
@@ -87,22 +93,21 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
                                       test_reader(test, {}, reading), task);
       },
       report);
-  if (run->is_implausible) throw refused(run->refusal, run->input_mistakes);
-  Outcome outcome;
-  if (!run->refusal.empty()) outcome.warn()(run->refusal);
-  const report::CalibrationFacts facts = run->facts("");
-  nb::dict result = outcome.dict(report::calibration_text(facts), report::calibration_json(facts));
+  if (run->is_implausible) throw refused(run->refusal, words(run->input_mistakes, outcome.face()));
+  if (!run->refusal.empty()) outcome.warn()(finding("not_converged", run->refusal));
+  std::ranges::for_each(run->measurements.warnings, outcome.warn());
+  std::ranges::for_each(run->input_mistakes, outcome.warn());
+  const report::Document document = report::calibration_document(*run);
+  nb::dict result = outcome.dict(report::document_text(document), report::calibration_json(*run, ""));
+  result["document"] = report::to_json(document).dump(-1, ' ', false, report::Json::error_handler_t::replace);
   result["robot"] = made_from(arm, run->report.best());
   nb::dict errors;
-  for (const report::JudgedModel& model : facts.models) {
-    const bool held_out = model.stage->held_out_mm.size() > 0;
-    errors[model.name.c_str()] = numbers_of(held_out ? model.stage->held_out_mm : model.stage->in_sample_mm);
+  for (const report::JudgedModel& model : run->models) {
+    const bool held_out = model.stage.held_out_mm.size() > 0;
+    errors[model.name.c_str()] = numbers_of(held_out ? model.stage.held_out_mm : model.stage.in_sample_mm);
   }
   result["errors"] = errors;
-  result["page"] = page_of(page, [&] {
-    return report::calibration_report({arm.name, measured.first, run->nominal, report::points_of(run->measurements),
-                                       run->report, run->task.options, run->input_mistakes});
-  });
+  result["page"] = page_of(page, [&] { return report::calibration_page(*run); });
   return result;
 }
 
@@ -132,7 +137,7 @@ nb::dict discover(const Arm& arm, const Source& measured, const std::optional<So
   task.options.held_out_share = held_out;
   task.options.mass_uncertainty = mass_uncertainty;
   task.options.seed = seed;
-  Outcome outcome;
+  Outcome outcome(python_face(measured.second));
   std::optional<report::DiscoveryRun> run;
   std::optional<robotics::Measurements> judged;  // by the picture of the errors
   const auto work = [&](const Progress& progress) {
@@ -148,7 +153,8 @@ nb::dict discover(const Arm& arm, const Source& measured, const std::optional<So
   } catch (const std::runtime_error& error) {
     throw refused(error.what(), outcome.warnings());
   }
-  nb::dict result = outcome.dict(report::discovery_text(*run, measured.first), report::discovery_run_json(*run));
+  nb::dict result = outcome.dict(report::discovery_text(*run, measured.first, report::no_width_limit, outcome.face()),
+                                 report::discovery_run_json(*run));
   result["robot"] = made_from(arm, run->found.improved);
   nb::dict errors;
   errors["before"] = numbers_of(robotics::distances(robotics::positions(run->found.before, judged->poses), *judged));
@@ -177,8 +183,10 @@ nb::dict check(const Arm& arm, const Source& measured, const Reading& reading, b
         found = report::run_check(arm.name, measured.first, robot, measurements, options);
       },
       report);
-  const report::CheckFacts facts{arm.name, measured.first, robot.robot, measurements, options, found};
+  const report::CheckFacts facts{
+      arm.name, measured.first, robot.robot, measurements, options, found, python_face(measured.second)};
   nb::dict result = Outcome().dict(report::check_text(facts), report::check_json(facts));
+  result["summary"] = report::check_summary(facts);
   result["errors"] = numbers_of(found.errors_mm);
   return result;
 }
@@ -207,8 +215,15 @@ nb::dict poses(const Arm& arm, const Reading& reading, Eigen::Index count, const
         selection = robotics::select_poses(robot, plan, options);
       },
       report);
-  const report::PoseFacts facts{
-      arm.name, from ? from->first : "", use ? use->first : "", noise_um, robot, plan, options, selection};
+  const report::PoseFacts facts{arm.name,
+                                from ? from->first : "",
+                                use ? use->first : "",
+                                noise_um,
+                                robot,
+                                plan,
+                                options,
+                                selection,
+                                python_face(use ? use->second : std::nullopt)};
   nb::dict result = Outcome().dict(report::poses_text(facts), report::poses_json(facts, ""));
   result["csv"] = report::poses_csv(robot, selection.poses);
   return result;
@@ -219,13 +234,13 @@ nb::dict compensate(const Arm& arm, const Source& targets, const Arm* nominal, c
                     const nb::object& report) {
   report::CompensationTask task{.robot_file = arm.name,
                                 .targets_file = targets.first,
-                                .nominal_file = nominal != nullptr ? nominal->name : "",
+                                .nominal_file = "nominal",
                                 .in_base_frame = in_base_frame,
                                 .nominal_frames = nominal_frames,
                                 .position_only = position_only,
                                 .tolerance_mm = 1e-3 * tolerance_um};
   if (nominal != nullptr) task.read_nominal = [nominal] { return nominal->robot.robot.chain; };
-  Outcome outcome;
+  Outcome outcome(python_face(targets.second));
   std::optional<report::CompensationRun> run;
   interruptible(
       [&](const Progress& progress) {
@@ -234,7 +249,7 @@ nb::dict compensate(const Arm& arm, const Source& targets, const Arm* nominal, c
         run = report::run_compensation(alone, targets_of(targets, alone.robot, reading), task, outcome.warn());
       },
       report);
-  if (const std::string refusal = report::compensation_refusal(*run); !refusal.empty()) outcome.warn()(refusal);
+  if (const auto refusal = report::compensation_refusal(*run)) outcome.warn()(*refusal);
   nb::dict result = outcome.dict(report::compensation_text(*run, ""), report::compensation_json(*run, ""));
   result["csv"] = report::commands_csv(*run);
   result["before_mm"] = numbers_of(run->found.before_mm);
@@ -291,7 +306,9 @@ nb::dict export_geometry(const Arm& arm, const Arm* nominal) {
   const robotics::Robot& robot = arm.robot.robot;
   Outcome outcome;
   if (!robot.effects.empty() || arm.robot.correction) {
-    outcome.warn()("The table holds the geometry alone: effects and correction are left out; compensate() has them");
+    outcome.warn()(
+        finding("effects_left_out",
+                "The table holds the geometry alone: effects and correction are left out; compensate() has them"));
   }
   if (const std::string uncertain = report::uncertain_text(robot); !uncertain.empty()) {
     outcome.warn()(report::uncertain_values_warning(uncertain));

@@ -110,6 +110,18 @@ def html_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
+def document_tables(document: Mapping[str, Any]) -> list[str]:
+    """The tables of a page in HTML, each below its title; of a picture the table that a terminal shows in its place."""
+    tables = []
+    for section in document["sections"]:
+        for block in section["blocks"]:
+            table = block.get("in_words", block)
+            if table["kind"] == "table":
+                title = html.escape(table["title"] or section["title"])
+                tables.append(f"<p>{title}</p>" + html_table(table["header"], table["rows"]))
+    return tables
+
+
 def axes_of(ax: Any) -> Any:
     """The axes that were given, or new ones."""
     if ax is not None:

@@ -87,8 +87,8 @@ std::vector<CalibrationDetails::Share> shares_of(const robotics::Robot& nominal,
 
 std::vector<JudgedModel> judged_models(const CalibrationReport& report, const robotics::Measurements& measurements,
                                        const std::optional<robotics::Measurements>& test, bool new_session) {
-  std::vector<JudgedModel> models = {{"nominal", &report.nominal}, {"geometric", &report.geometric}};
-  if (report.corrected) models.push_back({"corrected", &*report.corrected});
+  std::vector<JudgedModel> models = {{"nominal", report.nominal}, {"geometric", report.geometric}};
+  if (report.corrected) models.push_back({"corrected", *report.corrected});
   if (!test) return models;
   const robotics::Poses known = new_session ? robotics::Poses{} : measurements.poses;
   const auto placed = [&](const robotics::Robot& robot) { return with_placed_frames(robot, *test, known); };
@@ -106,7 +106,6 @@ CalibrationDetails calibration_details(const robotics::Robot& nominal, const rob
   details.leave_one_out_mm = errors(robotics::position_rows(measurements.poses)).mean();
   details.seen = robotics::observability_of(report.calibration, measurements);
   details.repeats = robotics::noise_of_repeats(measurements);
-  details.learning = robotics::learning_curve(nominal, measurements, options.calibration, 3, options.seed);
   details.correlations = strongest(report.calibration.result);
   details.shares = shares_of(nominal, measurements, report, details.repeats, options.calibration);
   return details;

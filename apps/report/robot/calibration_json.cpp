@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "report/robot/calibration_facts.hpp"
+#include "report/robot/calibration_run.hpp"
 #include "report/robot/measurement_text.hpp"
 
 namespace llmt::report {
@@ -8,7 +8,7 @@ namespace {
 
 using robotics::error_figures;
 
-Json details_json(const CalibrationDetails& details) {
+Json details_json(const CalibrationDetails& details, const std::vector<robotics::LearningPoint>& learning) {
   const robotics::Observability& seen = details.seen;
   Json json;
   json["leave_one_out_mm"] = details.leave_one_out_mm;
@@ -16,7 +16,7 @@ Json details_json(const CalibrationDetails& details) {
   json["repeat_noise_mm"] = details.repeats ? Json(details.repeats->sigma_mm) : Json(nullptr);
   json["repeats"] = details.repeats ? details.repeats->freedom : 0;
   json["learning_curve"] = Json::array();
-  for (const robotics::LearningPoint& point : details.learning) {
+  for (const robotics::LearningPoint& point : learning) {
     json["learning_curve"].push_back(
         {{"poses", point.poses}, {"fitted_mm", point.fitted_mm}, {"held_out_mm", point.held_out_mm}});
   }
@@ -34,29 +34,29 @@ Json figures_json(const robotics::ErrorFigures& figures) {
   return {{"mean", figures.mean}, {"p95", figures.p95}, {"max", figures.max}, {"rms", figures.rms}};
 }
 
-Json calibration_json(const CalibrationFacts& facts) {
-  const robotics::CalibrationReport& report = facts.report;
-  const robotics::Measurements& measurements = facts.measurements;
+Json calibration_json(const CalibrationRun& run, const std::string& output) {
+  const robotics::CalibrationReport& report = run.report;
+  const robotics::Measurements& measurements = run.measurements;
   const discovery::SolverResult& result = report.calibration.result;
   Json json;
-  json["robot"] = facts.robot_file;
-  json["data"] = facts.data_file;
+  json["robot"] = run.task.robot_file;
+  json["data"] = run.task.data_file;
   json["poses"] = report.calibration.robot.calibration->poses;
   json["readings"] = measurements.count();
   json["folds"] = report.folds;
-  json["contiguous"] = facts.contiguous;
+  json["contiguous"] = run.task.options.kind == FoldKind::contiguous;
   json["grouped_by_pose"] = report.grouped;
-  for (const JudgedModel& row : facts.models) {
+  for (const JudgedModel& row : run.models) {
     Json entry;
-    entry["in_sample_mm"] = figures_json(error_figures(row.stage->in_sample_mm));
+    entry["in_sample_mm"] = figures_json(error_figures(row.stage.in_sample_mm));
     entry["held_out_mm"] =
-        row.stage->held_out_mm.size() > 0 ? figures_json(error_figures(row.stage->held_out_mm)) : Json(nullptr);
+        row.stage.held_out_mm.size() > 0 ? figures_json(error_figures(row.stage.held_out_mm)) : Json(nullptr);
     if (row.test) entry["test_mm"] = figures_json(*row.test);
-    if (row.stage->in_sample_mrad.size() > 0) {
-      entry["in_sample_mrad"] = figures_json(error_figures(row.stage->in_sample_mrad));
+    if (row.stage.in_sample_mrad.size() > 0) {
+      entry["in_sample_mrad"] = figures_json(error_figures(row.stage.in_sample_mrad));
     }
-    if (row.stage->held_out_mrad.size() > 0) {
-      entry["held_out_mrad"] = figures_json(error_figures(row.stage->held_out_mrad));
+    if (row.stage.held_out_mrad.size() > 0) {
+      entry["held_out_mrad"] = figures_json(error_figures(row.stage.held_out_mrad));
     }
     if (row.test_mrad) entry["test_mrad"] = figures_json(*row.test_mrad);
     json["errors"][row.name] = std::move(entry);
@@ -94,18 +94,18 @@ Json calibration_json(const CalibrationFacts& facts) {
   for (const robotics::IdentifiedParameter& parameter : robotics::uncertain_parameters(report.calibration.robot)) {
     json["uncertain"].push_back(parameter.name);
   }
-  std::vector<std::string> warnings = measurements.warnings;
-  warnings.insert(warnings.end(), facts.input_mistakes.begin(), facts.input_mistakes.end());
-  json["warnings"] = warnings;
-  json["outlier_lines"] = facts.outlier_lines;
-  if (facts.used) {
-    json["test_coverage"] = {{"outside", facts.used->outside.size()},
-                             {"deviation_inside_mm", facts.used->deviation_inside_mm},
-                             {"deviation_outside_mm", facts.used->deviation_outside_mm}};
+  std::vector<Finding> warnings = measurements.warnings;
+  warnings.insert(warnings.end(), run.input_mistakes.begin(), run.input_mistakes.end());
+  json["warnings"] = words(warnings, run.task.face);
+  json["outlier_lines"] = run.outlier_lines;
+  if (run.used) {
+    json["test_coverage"] = {{"outside", run.used->outside.size()},
+                             {"deviation_inside_mm", run.used->deviation_inside_mm},
+                             {"deviation_outside_mm", run.used->deviation_outside_mm}};
   }
-  if (facts.details) json["quality"] = details_json(*facts.details);
+  if (run.details) json["quality"] = details_json(*run.details, run.learning);
   json["unused_columns"] = measurements.unused_columns;
-  json["output"] = facts.output.empty() ? Json(nullptr) : Json(facts.output);
+  json["output"] = output.empty() ? Json(nullptr) : Json(output);
   return json;
 }
 

@@ -17,7 +17,8 @@ robotics::Measurements test_of(const CalibrationTask& task, const robotics::Robo
                                const ReadMeasurements& read_test) {
   robotics::Measurements test = read_test(nominal);
   if (!task.new_session) {
-    check_frames(task.test_file, nominal, test, "; --new-session fits base and tool to the test file");
+    check_frames(task.test_file, nominal, test,
+                 fmt::format("; {} fits base and tool to the test file", task.face.switched("new-session")));
   } else if (constexpr std::size_t values_of_frames = 9; robotics::measured_rows(test).size() <= values_of_frames) {
     throw std::runtime_error(fmt::format("{}: {} points do not tell base and tool ({} values) and the error, too",
                                          task.test_file, test.count(), values_of_frames));
@@ -73,14 +74,16 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
                      .test = {},
                      .outlier_lines = {},
                      .report = {},
+                     .models = {},
                      .input_mistakes = {},
                      .used = {},
                      .details = {},
+                     .learning = {},
                      .is_implausible = false,
                      .refusal = {}};
   robotics::Measurements& measurements = run.measurements;
   if (measurements.count() == 0) {
-    throw std::runtime_error(run.task.data_file + ": " + measurements.warnings.back());
+    throw std::runtime_error(run.task.data_file + ": " + measurements.warnings.back().words(run.task.face));
   }
   run.nominal = robotics::with_frames(described, measurements);
   if (run.task.robust) leave_outliers_out(run);
@@ -89,9 +92,13 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
   check_positions(run.task.robot_file, run.nominal, measurements.poses);
   run.report = robotics::report_calibration(run.nominal, measurements, run.task.options);
   run.task.options.progress = {};
-  if (const std::string far = robotics::far_readings(measurements, run.report); !far.empty() && !run.task.robust) {
-    measurements.warnings.push_back(far + ": --robust leaves such readings out");
+  if (std::optional<Finding> far = robotics::far_readings(measurements, run.report); far && !run.task.robust) {
+    far->words = [which = far->words](const Face& face) {
+      return fmt::format("{}: {} leaves such readings out", which(face), face.switched("robust"));
+    };
+    measurements.warnings.push_back(std::move(*far));
   }
+  run.models = judged_models(run.report, measurements, run.test, run.task.new_session);
   run.input_mistakes = robotics::input_mistakes(run.nominal, measurements, run.report);
   if (run.test) {
     robotics::Poses used = run.test->poses;
@@ -102,25 +109,13 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
   if (run.task.quality) {
     run.details = calibration_details(run.nominal, measurements, run.report, run.task.options);
   }
+  if (run.task.quality || run.task.page) {
+    const robotics::ReportOptions& options = run.task.options;
+    run.learning = robotics::learning_curve(run.nominal, measurements, options.calibration, 3, options.seed);
+  }
   run.is_implausible = robotics::is_implausible(run.nominal, run.report);
   run.refusal = refusal_of(run);
   return run;
-}
-
-CalibrationFacts CalibrationRun::facts(const std::string& output) const {
-  return {.robot_file = task.robot_file,
-          .data_file = task.data_file,
-          .output = output,
-          .note = use_of_orientations(measurements),
-          .contiguous = task.options.kind == FoldKind::contiguous,
-          .nominal = nominal,
-          .measurements = measurements,
-          .report = report,
-          .models = judged_models(report, measurements, test, task.new_session),
-          .input_mistakes = input_mistakes,
-          .outlier_lines = outlier_lines,
-          .used = used,
-          .details = details};
 }
 
 }  // namespace llmt::report

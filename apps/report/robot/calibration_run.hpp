@@ -18,9 +18,11 @@ struct CalibrationTask {
   std::string data_file;
   std::string test_file;
   bool robust = false;       ///< leave out readings that lie far off
-  bool quality = false;      ///< with CalibrationDetails
+  bool quality = false;      ///< with CalibrationDetails and the learning curve
+  bool page = false;         ///< with the learning curve
   bool new_session = false;  ///< base and tool are fitted to the test measurements
   robotics::ReportOptions options = {};
+  Face face = {};
 };
 
 /// A calibration with all that its reports show.
@@ -29,16 +31,15 @@ struct CalibrationRun {
   robotics::Robot nominal;              ///< as described, with frames for all that was measured
   robotics::Measurements measurements;  ///< that were fitted
   std::optional<robotics::Measurements> test;
-  std::vector<Eigen::Index> outlier_lines;
+  std::vector<Eigen::Index> outlier_lines;  ///< of the file: readings that were left out
   robotics::CalibrationReport report;
-  std::vector<std::string> input_mistakes;
-  std::optional<robotics::Coverage> used;
+  std::vector<JudgedModel> models;
+  std::vector<Finding> input_mistakes;
+  std::optional<robotics::Coverage> used;  ///< of the poses of the test file
   std::optional<CalibrationDetails> details;
-  bool is_implausible = false;  ///< the calibrated robot must not be used
-  std::string refusal;          ///< why the result is none, in a sentence; empty if it is one
-
-  /// For calibration_text() and calibration_json(): refers to this. `output`: file of the description, or empty.
-  CalibrationFacts facts(const std::string& output) const;
+  std::vector<robotics::LearningPoint> learning;  ///< empty if nobody asked for it, or of few poses
+  bool is_implausible = false;                    ///< the calibrated robot must not be used
+  std::string refusal;                            ///< why the result is none, in a sentence; empty if it is one
 };
 
 /// Reads measurements of a robot.
@@ -48,5 +49,8 @@ using ReadMeasurements = std::function<robotics::Measurements(const robotics::Ro
 /// std::runtime_error with the names of the files, and as robotics::report_calibration().
 CalibrationRun run_calibration(const robotics::Robot& described, const robotics::Measurements& measured,
                                const ReadMeasurements& read_test, CalibrationTask task);
+
+/// `output`: the file of the calibrated description; empty: none.
+Json calibration_json(const CalibrationRun& run, const std::string& output);
 
 }  // namespace llmt::report

@@ -41,14 +41,10 @@ std::vector<Eigen::Index> lines_of(const robotics::Measurements& measurements, c
   return lines;
 }
 
-std::string lines_text(const std::vector<Eigen::Index>& lines) {
+std::string coverage_text(const CheckFacts& facts) {
   constexpr std::size_t most = 20;
-  const auto shown = static_cast<std::ptrdiff_t>(std::min(most, lines.size()));
-  return fmt::format("line{} {}{}", lines.size() == 1 ? "" : "s", fmt::join(lines.begin(), lines.begin() + shown, ", "),
-                     lines.size() > most ? ", ..." : "");
-}
-
-std::string coverage_text(const robotics::Measurements& measurements, const RobotCheck& check) {
+  const robotics::Measurements& measurements = facts.measurements;
+  const RobotCheck& check = facts.check;
   std::string text;
   if (!check.has_ranges) {
     text +=
@@ -58,11 +54,11 @@ std::string coverage_text(const robotics::Measurements& measurements, const Robo
   if (check.uncovered.empty()) return text;
   const std::vector<Eigen::Index> lines = lines_of(measurements, check.uncovered);
   text += fmt::format("{} of {} readings lie beyond the calibrated joint ranges ({}):\n", check.uncovered.size(),
-                      measurements.count(), lines_text(lines));
+                      measurements.count(), facts.face.rows(lines, most));
   for (const robotics::JointBeyond& joint : check.beyond) {
     text += fmt::format("  {} from {:.4g} to {:.4g} {}, calibrated from {:.4g} to {:.4g} ({})\n", joint.joint,
                         joint.used_low, joint.used_high, joint.unit, joint.measured_low, joint.measured_high,
-                        lines_text(lines_of(measurements, joint.rows)));
+                        facts.face.rows(lines_of(measurements, joint.rows), most));
   }
   if (check.too_few_covered) {
     return text + "The others are too few to say what moved.\n";
@@ -101,26 +97,33 @@ std::string moved_text(const CheckFacts& facts) {
 
 }  // namespace
 
+std::string check_summary(const CheckFacts& facts) {
+  const RobotCheck& check = facts.check;
+  return fmt::format("{} Mean position error {:.4f} mm (95 % {:.4f}, max {:.4f}); {} {:.4f} mm, good up to {:.4f} mm.",
+                     check.still_good ? "STILL GOOD." : "NO LONGER GOOD.", check.error.mean, check.error.p95,
+                     check.error.max, facts.options.accuracy_mm ? "stated" : "at calibration", check.accuracy_mm,
+                     check.limit_mm);
+}
+
 std::string check_text(const CheckFacts& facts) {
   const robotics::Robot& robot = facts.robot;
   const RobotCheck& check = facts.check;
   std::string text;
-  for (const std::string& warning : facts.measurements.warnings) text += "Note: " + warning + "\n";
-  text += fmt::format("{}: {} poses of {}\n", facts.data, check.errors_mm.size(), robot.chain.name);
-  text += facts.options.same_session ? "The same session: base and tool are those of the calibration.\n\n"
-                                     : "The instrument was set up anew: base and tool were fitted to these poses "
-                                       "(--same-session keeps them).\n\n";
-  text += fmt::format(
-      "{} Mean position error {:.4f} mm (95 % {:.4f}, max {:.4f}); {} {:.4f} mm, good up to {:.4f} "
-      "mm.\n",
-      check.still_good ? "STILL GOOD." : "NO LONGER GOOD.", check.error.mean, check.error.p95, check.error.max,
-      facts.options.accuracy_mm ? "stated" : "at calibration", check.accuracy_mm, check.limit_mm);
+  for (const std::string& warning : words(facts.measurements.warnings, facts.face)) text += "Note: " + warning + "\n";
+  text += fmt::format("{}: {} poses of {}\n", facts.face.table(facts.data), check.errors_mm.size(), robot.chain.name);
+  text += facts.options.same_session ? std::string("The same session: base and tool are those of the calibration.\n\n")
+                                     : fmt::format(
+                                           "The instrument was set up anew: base and tool were fitted to "
+                                           "these poses ({} keeps them).\n\n",
+                                           facts.face.switched("same-session"));
+  text += check_summary(facts) + "\n";
   if (check.accuracy_is_of_noise) {
-    text +=
+    text += fmt::format(
         "The description has no error of these coordinates on poses left out: that figure comes from the poses it was "
-        "fitted to, and new poses are worse. --accuracy-mm says what is good enough.\n";
+        "fitted to, and new poses are worse. {} says what is good enough.\n",
+        facts.face.option("accuracy-mm"));
   }
-  text += coverage_text(facts.measurements, check);
+  text += coverage_text(facts);
   text += moved_text(facts);
   if (check.unexplained) {
     text += fmt::format(

@@ -17,8 +17,11 @@ struct CheckFacts {
   const robotics::Measurements& measurements;
   const robotics::CheckOptions& options;
   const robotics::RobotCheck& check;
+  Face face = {};
 };
 
+/// Still good or not, with the error and the limit, in two sentences.
+std::string check_summary(const CheckFacts& facts);
 /// For people: still good or not, what moved, what the poses do not show.
 std::string check_text(const CheckFacts& facts);
 Json check_json(const CheckFacts& facts);

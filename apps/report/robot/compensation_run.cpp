@@ -72,7 +72,10 @@ robotics::Targets asked(const CompensationTask& task, const CorrectedRobot& robo
     to_world(robot.robot.chain, targets);
   }
   if (table.positions_mm.size() > 0 && task.read_nominal) {
-    warn(fmt::format("{}: the targets are poses: {} is not read", task.targets_file, task.nominal_file));
+    warn({"nominal_not_read", [=](const Face& face) {
+            return fmt::format("{}: the targets are poses: {} is not read", face.table(task.targets_file),
+                               task.nominal_file);
+          }});
   }
   if (task.position_only) targets.rotations.clear();
   if (table.joints.size() == 0) targets.start.joints = robotics::rigid_joints(robot.robot, targets, progress);
@@ -84,19 +87,26 @@ void name_rows(const CompensationRun& run, const Warn& warn) {
   const Compensation& found = run.found;
   constexpr int most = 20;
   int said = 0;
-  const auto say = [&](std::size_t row, const std::string& what) {
-    if (said++ < most) warn(fmt::format("{}:{}: {}", run.task.targets_file, run.table.lines[row], what));
+  const auto say = [&](std::size_t row, const std::string& code, const std::string& what) {
+    const Eigen::Index line = run.table.lines[row];
+    if (said++ >= most) return;
+    warn({code,
+          [=, file = run.task.targets_file](const Face& face) {
+            return fmt::format("{}: {}", face.place(file, line), what);
+          },
+          {line}});
   };
   for (std::size_t row = 0; row < found.outcomes.size(); ++row) {
     if (found.outcomes[row] != Outcome::reached) {
-      say(row, fmt::format("{}: {}; {:.4g} mm away", robotics::to_string(found.outcomes[row]), found.reasons[row],
-                           found.after_mm(row)));
+      const std::string outcome = robotics::to_string(found.outcomes[row]);
+      say(row, outcome, fmt::format("{}: {}; {:.4g} mm away", outcome, found.reasons[row], found.after_mm(row)));
     }
-    if (!found.uncovered[row].empty()) say(row, "not covered: " + found.uncovered[row]);
+    if (!found.uncovered[row].empty()) say(row, "not_covered", "not covered: " + found.uncovered[row]);
   }
   if (said > most) {
-    warn(
-        fmt::format("{}: {} more rows; the columns outcome and covered have them", run.task.targets_file, said - most));
+    warn({"more_rows", [file = run.task.targets_file, more = said - most](const Face& face) {
+            return fmt::format("{}: {} more rows; the columns outcome and covered have them", face.table(file), more);
+          }});
   }
 }
 
@@ -141,10 +151,12 @@ void warn_of_units(const std::string& file, const robotics::Chain& chain, const 
     }
   }
   if (outside.empty()) return;
-  warn(
-      fmt::format("WARNING: {}: joint values outside of the joints' limits: {}; are the units in the column names "
-                  "right (_rad, _deg)?",
-                  file, fmt::join(outside, ", ")));
+  const std::string said = fmt::format(
+      "joint values outside of the joints' limits: {}; are the units in the column names right (_rad, _deg)?",
+      fmt::join(outside, ", "));
+  warn({.code = "joint_limits",
+        .words = [=](const Face& face) { return fmt::format("{}: {}", face.table(file), said); },
+        .is_mistake = true});
 }
 
 }  // namespace
@@ -166,9 +178,12 @@ CompensationRun run_compensation(const CorrectedRobot& robot, robotics::TargetTa
   name_made_up(start, run.found.commands, warn);
   name_rows(run, warn);
   const std::vector<std::string>& unused = run.table.unused_columns;
-  if (!unused.empty()) warn(fmt::format("Columns not used: {}", fmt::join(unused, ", ")));
+  if (!unused.empty()) {
+    warn(finding("columns_not_used", fmt::format("Columns not used: {}", fmt::join(unused, ", "))));
+  }
   if (!run.targets.rotations.empty() && robotics::drive_count(robot.robot.chain) < 6) {
-    warn(fmt::format("{} has fewer than six drives: orientations are not kept", robot.robot.chain.name));
+    warn(finding("few_drives",
+                 fmt::format("{} has fewer than six drives: orientations are not kept", robot.robot.chain.name)));
   }
   work.finish();
   return run;
@@ -237,11 +252,14 @@ std::string compensation_text(const CompensationRun& run, const std::string& out
       mean_distances(run.table, found), output.empty() ? "" : "\nWritten to " + output);
 }
 
-std::string compensation_refusal(const CompensationRun& run) {
+std::optional<Finding> compensation_refusal(const CompensationRun& run) {
   const auto missed = std::ranges::count_if(
       run.found.outcomes, [](Outcome outcome) { return outcome == Outcome::limit || outcome == Outcome::unreachable; });
-  if (missed == 0) return "";
-  return fmt::format("{}: {} target{} cannot be reached", run.task.targets_file, missed, missed == 1 ? "" : "s");
+  if (missed == 0) return {};
+  return Finding{"out_of_reach", [=, file = run.task.targets_file](const Face& face) {
+                   return fmt::format("{}: {} target{} cannot be reached", face.table(file), missed,
+                                      missed == 1 ? "" : "s");
+                 }};
 }
 
 }  // namespace llmt::report

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "llmt/robotics/compensation.hpp"
@@ -47,7 +48,7 @@ Json compensation_json(const CompensationRun& run, const std::string& output);
 /// For people, without a line break at its end.
 std::string compensation_text(const CompensationRun& run, const std::string& output);
 
-/// Why not all targets are met, in a sentence; empty if they can be reached.
-std::string compensation_refusal(const CompensationRun& run);
+/// Why not all targets are met; nothing if they can be reached.
+std::optional<Finding> compensation_refusal(const CompensationRun& run);
 
 }  // namespace llmt::report

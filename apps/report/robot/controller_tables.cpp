@@ -81,11 +81,13 @@ std::string deltas_csv(const robotics::Chain& chain, const robotics::Chain& nomi
   return text;
 }
 
-std::string uncertain_values_warning(const std::string& uncertain) {
-  return fmt::format(
-      "Uncertain values: {}. Calibration could not determine each of them alone, so do not take them for the true "
-      "ones. Load all values of the table into the controller, or none",
-      uncertain);
+Finding uncertain_values_warning(const std::string& uncertain) {
+  return finding(
+      "uncertain_values",
+      fmt::format(
+          "Uncertain values: {}. Calibration could not determine each of them alone, so do not take them for the true "
+          "ones. Load all values of the table into the controller, or none",
+          uncertain));
 }
 
 }  // namespace llmt::report

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "llmt/finding.hpp"
 #include "llmt/robotics/chain.hpp"
 
 namespace llmt::report {
@@ -16,6 +17,6 @@ std::string kinematics_yaml(const robotics::Chain& described);
 std::string deltas_csv(const robotics::Chain& chain, const robotics::Chain& nominal);
 
 /// What to say beside these tables of values that calibration could not determine alone, see uncertain_text().
-std::string uncertain_values_warning(const std::string& uncertain);
+Finding uncertain_values_warning(const std::string& uncertain);
 
 }  // namespace llmt::report

@@ -45,8 +45,9 @@ robotics::CorrectedRobot arm_alone(const std::string& file, robotics::CorrectedR
     if (robotics::effect_type(effect.type).of_measuring) titles.push_back(robotics::effect_type(effect.type).title);
   }
   if (!titles.empty()) {
-    warn(fmt::format("{}: left out, because they were errors of the measurement and not of the arm: {}", file,
-                     fmt::join(titles, ", ")));
+    warn(finding("errors_of_measuring",
+                 fmt::format("{}: left out, because they were errors of the measurement and not of the arm: {}", file,
+                             fmt::join(titles, ", "))));
   }
   return robot;
 }
@@ -57,15 +58,17 @@ void name_made_up(const robotics::Poses& given, const robotics::Poses& completed
     if (!given.covariates.contains(name)) names.push_back(name);
   }
   if (names.empty()) return;
-  warn(
-      fmt::format("Columns that effects need and the table does not have: {}. Directions and moves are those of going "
-                  "from row to row, order counts the rows, everything else is neutral (docs/commands.md)",
-                  fmt::join(names, ", ")));
+  warn(finding("columns_made_up",
+               fmt::format("Columns that effects need and the table does not have: {}. Directions and moves are those "
+                           "of going from row to row, order counts the rows, everything else is neutral "
+                           "(docs/commands.md)",
+                           fmt::join(names, ", "))));
 }
 
-std::string use_of_orientations(const robotics::Measurements& measurements) {
+std::string use_of_orientations(const robotics::Measurements& measurements, const Face& face) {
   if (measurements.orientation.values.size() == 0 || !robotics::orientation_rows(measurements.poses).empty()) return "";
-  return "The file has orientations. Only the positions are used; --orientations uses both.\n";
+  return fmt::format("The file has orientations. Only the positions are used; {} uses both.",
+                     face.switched("orientations"));
 }
 
 }  // namespace llmt::report

@@ -5,14 +5,15 @@
 #include <functional>
 #include <string>
 
+#include "llmt/finding.hpp"
 #include "llmt/robotics/correction.hpp"
 #include "llmt/robotics/measurements.hpp"
 #include "llmt/robotics/robot.hpp"
 
 namespace llmt::report {
 
-/// Takes a sentence that people should read although the work goes on.
-using Warn = std::function<void(const std::string& sentence)>;
+/// Takes what people should know although the work goes on.
+using Warn = std::function<void(const Finding& finding)>;
 
 /// Throws std::runtime_error, with the name of the robot's file, if a tool position at these poses makes no sense.
 void check_positions(const std::string& file, const robotics::Robot& robot, const robotics::Poses& poses);
@@ -29,7 +30,7 @@ robotics::CorrectedRobot arm_alone(const std::string& file, robotics::CorrectedR
 /// Warns of the columns that effects need and that were not given.
 void name_made_up(const robotics::Poses& given, const robotics::Poses& completed, const Warn& warn);
 
-/// What orientations of the file are used for, as a line; empty if there are none.
-std::string use_of_orientations(const robotics::Measurements& measurements);
+/// What orientations of the file are used for, in two sentences; empty if there are none.
+std::string use_of_orientations(const robotics::Measurements& measurements, const Face& face);
 
 }  // namespace llmt::report

@@ -34,7 +34,7 @@ bool is_on_last_axis(const robotics::Chain& chain) {
 }
 
 std::string use_words(const PoseFacts& facts) {
-  if (!facts.use.empty()) return "over the poses of " + facts.use;
+  if (!facts.use.empty()) return "over the poses of " + facts.face.table(facts.use);
   if (!facts.from.empty()) return "over the candidates";
   return !facts.options.box ? "over random poses within the joint limits" : "over random poses within limits and box";
 }
@@ -160,8 +160,8 @@ std::string poses_text(const PoseFacts& facts, std::size_t width) {
   if (is_on_last_axis(robot.chain)) {
     text += fmt::format(
         "The measured point lies on the last axis, so {} does not move it. If the target is beside the "
-        "axis, --tool x,y,z says where.\n",
-        robot.chain.joints.back().name);
+        "axis, {} x,y,z says where.\n",
+        robot.chain.joints.back().name, facts.face.option("tool"));
   }
   if (!selection.left_out.empty()) {
     text += fmt::format("Taken as known, because the poses lack the columns that they depend on: {}\n",

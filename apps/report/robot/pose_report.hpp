@@ -32,6 +32,7 @@ struct PoseFacts {
   const robotics::PosePlan& plan;
   const robotics::PoseSelectionOptions& options;
   const robotics::PoseSelection& selection;
+  Face face = {};
 };
 
 /// Joint values in degrees, to thousandths, or mm, to micrometres; and the covariates.

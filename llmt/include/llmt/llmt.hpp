@@ -15,6 +15,7 @@
 #include "llmt/distributed.hpp"
 #include "llmt/explain.hpp"
 #include "llmt/files.hpp"
+#include "llmt/finding.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/fit_result.hpp"
 #include "llmt/folds.hpp"

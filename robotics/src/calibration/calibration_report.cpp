@@ -1,7 +1,6 @@
 #include "llmt/robotics/calibration_report.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -149,9 +148,13 @@ bool is_implausible(const Robot& nominal, const CalibrationReport& report) {
   return median(report.geometric.in_sample_mm) > implausible_share * length_of(nominal.chain);
 }
 
-std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& measurements,
-                                        const CalibrationReport& report) {
-  std::vector<std::string> found;
+std::vector<Finding> input_mistakes(const Robot& robot, const Measurements& measurements,
+                                    const CalibrationReport& report) {
+  std::vector<Finding> found;
+  const auto add = [&](const char* code, std::string sentence) {
+    found.push_back(finding(code, std::move(sentence)));
+    found.back().is_mistake = true;
+  };
   const double length_mm = length_of(robot.chain);
   for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
     const Joint& joint = robot.chain.joints[j];
@@ -160,11 +163,12 @@ std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& 
     constexpr double slack = 1.0;  // degree or mm
     const Eigen::Index outside = (values < joint.limits->at(0) - slack || values > joint.limits->at(1) + slack).count();
     if (outside > 0) {
-      found.push_back(fmt::format(
-          "{} of {} values of {} {} outside its limits, {:.4g} to {:.4g} {} ({:.4g} to {:.4g} {} measured): "
-          "are the units right, is it this robot?",
-          outside, measurements.count(), joint.name, outside == 1 ? "lies" : "lie", joint.limits->at(0),
-          joint.limits->at(1), limit_unit(joint), values.minCoeff(), values.maxCoeff(), limit_unit(joint)));
+      add("joint_limits",
+          fmt::format(
+              "{} of {} values of {} {} outside its limits, {:.4g} to {:.4g} {} ({:.4g} to {:.4g} {} measured): "
+              "are the units right, is it this robot?",
+              outside, measurements.count(), joint.name, outside == 1 ? "lies" : "lie", joint.limits->at(0),
+              joint.limits->at(1), limit_unit(joint), values.minCoeff(), values.maxCoeff(), limit_unit(joint)));
     }
   }
   const double implausible_mm = implausible_share * length_mm;
@@ -173,39 +177,39 @@ std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& 
   const Eigen::Index parameters = report.calibration.result.rank;
   constexpr Eigen::Index fewest_per_parameter = 2;
   if (coordinates < fewest_per_parameter * parameters) {
-    found.push_back(
+    add("few_poses",
         fmt::format("{} parameters were identified from {} measured coordinates: so few poses can be fitted by wrong "
                     "values; only the error on poses left out says something, and more poses are needed",
                     parameters, coordinates));
   } else if (is_held_out && report.geometric.held_out_mm.mean() >= report.nominal.held_out_mm.mean()) {
-    found.push_back(
+    add("no_gain",
         "on poses left out the calibrated robot is no better than the described one: keep the description, or measure "
         "more poses");
   }
   const double nominal = report.nominal.in_sample_mm.mean();
   const double calibrated = (is_held_out ? report.geometric.held_out_mm : report.geometric.in_sample_mm).mean();
   if (calibrated > implausible_mm) {
-    found.push_back(
+    add("calibrated_misses",
         fmt::format("the calibrated robot still misses the {} by {:.4g} mm on average, {:.0f} % of the arm's length: "
                     "this description does not belong to these measurements, and the identified values mean nothing; "
                     "check units, signs and zeros of the joints, their order, and whether it is this robot",
                     is_held_out ? "held-out points" : "measured points", calibrated, 100.0 * calibrated / length_mm));
   } else if (nominal > implausible_mm) {
-    found.push_back(
+    add("described_misses",
         fmt::format("the described robot misses the measured points by {:.4g} mm on average, whatever its base and "
                     "tool: check units, signs and zeros of the joints, their order, and the description",
                     nominal));
   }
   if (has_wrong_orientations(report)) {
     const std::string likely = orientation_mistake(robot, measurements);
-    found.push_back(fmt::format("the calibrated robot turns its tool by {:.3g} mrad otherwise than was measured{}",
-                                report.geometric.in_sample_mrad.mean(),
-                                likely.empty() ? ": is the quaternion w, x, y, z, is the convention of angles right?"
-                                               : "; most likely " + likely));
+    add("turned", fmt::format("the calibrated robot turns its tool by {:.3g} mrad otherwise than was measured{}",
+                              report.geometric.in_sample_mrad.mean(),
+                              likely.empty() ? ": is the quaternion w, x, y, z, is the convention of angles right?"
+                                             : "; most likely " + likely));
   }
   if (nominal > implausible_mm) {
-    const std::string units = input_mistake(robot, measurements, implausible_share);
-    if (!units.empty()) found.push_back(units);
+    const std::string likely = input_mistake(robot, measurements, implausible_share);
+    if (!likely.empty()) add("likely_mistake", likely);
   }
   return found;
 }
@@ -229,11 +233,11 @@ double far_limit(const Eigen::VectorXd& errors_mm) {
 
 }  // namespace
 
-std::string far_readings(const Measurements& measurements, const CalibrationReport& report) {
+std::optional<Finding> far_readings(const Measurements& measurements, const CalibrationReport& report) {
   const bool is_held_out = report.geometric.held_out_mm.size() > 0;
   const Eigen::VectorXd& errors = is_held_out ? report.geometric.held_out_mm : report.geometric.in_sample_mm;
   constexpr Eigen::Index fewest = 10;
-  if (errors.size() < fewest) return "";
+  if (errors.size() < fewest) return {};
   constexpr double much = 0.25;        // of the squares
   constexpr double few = 0.05;         // of the readings
   constexpr double few_all = 3.0;      // of a short file
@@ -250,13 +254,15 @@ std::string far_readings(const Measurements& measurements, const CalibrationRepo
   }
   const auto count = static_cast<double>(errors.size());
   const bool is_few = static_cast<double>(lines.size()) <= std::max(few * count, std::min(few_all, short_few * count));
-  if (lines.empty() || !is_few || squares < much * errors.squaredNorm()) return "";
-  const std::size_t shown = std::min(most_lines, lines.size());
-  return fmt::format("{} of {} readings lie far off and make {:.0f} % of the squared error ({}{} {}{})", lines.size(),
-                     errors.size(), 100.0 * squares / errors.squaredNorm(), measurements.lines.empty() ? "row" : "line",
-                     lines.size() == 1 ? "" : "s",
-                     fmt::join(lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
-                     shown < lines.size() ? ", ..." : "");
+  if (lines.empty() || !is_few || squares < much * errors.squaredNorm()) return {};
+  const std::string said = fmt::format("{} of {} readings lie far off and make {:.0f} % of the squared error",
+                                       lines.size(), errors.size(), 100.0 * squares / errors.squaredNorm());
+  return Finding{"far_readings",
+                 [said, lines, has_lines = !measurements.lines.empty()](const Face& face) {
+                   return fmt::format("{} ({})", said,
+                                      has_lines ? face.rows(lines, most_lines) : numbered("row", lines, most_lines));
+                 },
+                 lines};
 }
 
 CalibrationReport report_calibration(const Robot& robot, const Measurements& measurements,

@@ -57,7 +57,7 @@ class Header {
   const std::vector<std::string>& unused() const { return unused_; }
 
   /// Sentences on what the columns that are not used look like.
-  std::vector<std::string> hints() const;
+  std::vector<Finding> hints() const;
 
   /// The reason why the columns of an orientation are none, in words; empty if they are one.
   std::string lack_of_orientation() const;

@@ -7,7 +7,7 @@
 
 namespace llmt::robotics {
 
-std::vector<std::string> Header::hints() const {
+std::vector<Finding> Header::hints() const {
   struct Likeness {
     std::regex looks_like;
     const char* name;
@@ -38,17 +38,18 @@ std::vector<std::string> Header::hints() const {
       }
     }
   }
-  std::vector<std::string> hints;
-  if (const std::string lack = lack_of_orientation(); !lack.empty()) {
-    hints.push_back(fmt::format("{}: {}", csv_.name(), lack));
-  }
+  std::vector<Finding> hints;
+  const auto add = [&](const char* code, const std::string& text) {
+    hints.push_back({code, [name = csv_.name(), text](const Face& face) { return face.table(name) + ": " + text; }});
+  };
+  if (const std::string lack = lack_of_orientation(); !lack.empty()) add("lack_of_orientation", lack);
   for (const auto& [name, column] : seen) {
     const char last = column.back();
     const bool is_sigma = name.starts_with("sigma");
     const bool has_axis = last == 'x' || last == 'y' || last == 'z';
     const std::string own = !is_sigma ? name : has_axis ? fmt::format("sigma_{}_mm", last) : "sigma_mm";
-    hints.push_back(fmt::format("{}: column \"{}\" is not used; if it is what it looks like, name it {}", csv_.name(),
-                                column, own));
+    add("column_not_used",
+        fmt::format("column \"{}\" is not used; if it is what it looks like, name it {}", column, own));
   }
   return hints;
 }

@@ -170,7 +170,7 @@ Measurements from_csv(const Csv& all, const Robot& robot, const std::vector<std:
   for (Eigen::Index& row : kept) row = split.others[row];
   take_off_drift(all, split, robot, map, kept, measurements);
   measurements.unused_columns = header.unused();
-  for (const std::string& hint : header.hints()) measurements.warnings.push_back(hint);
+  for (Finding& hint : header.hints()) measurements.warnings.push_back(std::move(hint));
   return measurements;
 }
 

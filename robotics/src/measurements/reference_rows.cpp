@@ -133,10 +133,10 @@ double move_back(const Session& session, const Drift& drift, std::vector<Eigen::
   return greatest;
 }
 
-std::string lines_of(const std::vector<ReferenceReading>& readings) {
+std::string rows_of(const std::vector<ReferenceReading>& readings, const Face& face) {
   std::string text;
   for (const ReferenceReading& reading : readings) {
-    text += fmt::format("{}line {} (\"{}\")", text.empty() ? "" : ", ", reading.line, reading.point);
+    text += fmt::format("{}{} (\"{}\")", text.empty() ? "" : ", ", face.rows({reading.line}), reading.point);
   }
   return text;
 }
@@ -176,34 +176,40 @@ void take_off_drift(const Csv& csv, const ReferenceRows& split, const Robot& rob
 
   for (const Session& session : sessions_of(csv, header, readings, split, when, rows)) {
     const std::string of = session.name.empty() ? "" : fmt::format("session \"{}\": ", session.name);
-    const auto say = [&](const std::string& text) {
-      measurements.warnings.push_back(fmt::format("{}: {}{}", csv.name(), of, text));
+    const auto say = [&](const char* code, const std::string& text, const std::vector<ReferenceReading>& about = {}) {
+      Finding said = {code, [name = csv.name(), of, text, about](const Face& face) {
+                        return fmt::format("{}: {}{}{}", face.table(name), of, text, rows_of(about, face));
+                      }};
+      for (const ReferenceReading& reading : about) said.lines.push_back(reading.line);
+      measurements.warnings.push_back(std::move(said));
     };
     if (session.readings.empty()) {
-      say("there is no reading of a reference point: drift is not taken off");
+      say("no_reference", "there is no reading of a reference point: drift is not taken off");
       continue;
     }
     if (session.measured.empty()) continue;
     const auto rounds = rounds_of(session.readings, session.when);
     refuse_strange_round(csv, rounds);
     if (rounds.size() < 2) {
-      say("the reference points were read in one round only, which shows no drift: read them again at the end");
+      say("one_round",
+          "the reference points were read in one round only, which shows no drift: read them again at the end");
       continue;
     }
     const Drift drift(rounds);
     const std::string scatter =
         drift.scatter_mm() ? fmt::format("they scatter by {:.3g} mm", *drift.scatter_mm()) : "their scatter is unknown";
     if (!drift.strays().empty()) {
-      say(fmt::format("reference points far from where the others say, moved or mistaken: {}",
-                      lines_of(drift.strays())));
+      say("reference_strays", "reference points far from where the others say, moved or mistaken: ", drift.strays());
     }
     if (drift.p_value() > most_chance) {
-      say(fmt::format("reference points in {} rounds show no drift of the instrument ({}): nothing is taken off",
+      say("no_drift",
+          fmt::format("reference points in {} rounds show no drift of the instrument ({}): nothing is taken off",
                       rounds.size(), scatter));
       continue;
     }
     const double greatest = move_back(session, drift, rotations, measurements);
-    say(fmt::format("drift of the instrument by reference points in {} rounds is taken off: up to {:.3g} mm ({}{})",
+    say("moved_back",
+        fmt::format("drift of the instrument by reference points in {} rounds is taken off: up to {:.3g} mm ({}{})",
                     rounds.size(), greatest, scatter,
                     drift.turns() ? "" : "; three points that are not on a line would show rotations, too"));
   }

@@ -122,16 +122,24 @@ void add_points(const Csv& csv, const Header& header, const Words& targets, cons
       }
     }
     if (targets.empty() && !target.empty() && csv.rows() > 0 && seen.size() + zeros.size() == before) {
-      measurements.warnings.push_back(fmt::format("{}: target {} was never seen: its columns are empty", csv.name(),
-                                                  target.substr(0, target.size() - 1)));
+      measurements.warnings.push_back(
+          {"target_never_seen", [name = csv.name(), unseen = target.substr(0, target.size() - 1)](const Face& face) {
+             return fmt::format("{}: target {} was never seen: its columns are empty", face.table(name), unseen);
+           }});
     }
   }
   std::ranges::stable_sort(seen, {}, &Sighting::row);
   std::ranges::sort(zeros);
   if (!zeros.empty()) {
-    measurements.warnings.push_back(fmt::format(
-        "{}: {} of {} points are exactly zero, taken as missing and left out: line{} {}", csv.name(), zeros.size(),
-        csv.rows() * std::ssize(header.targets()), zeros.size() == 1 ? "" : "s", fmt::join(csv.lines_of(zeros), ", ")));
+    const Eigen::Index points = csv.rows() * std::ssize(header.targets());
+    const std::vector<Eigen::Index> lines = csv.lines_of(zeros);
+    measurements.warnings.push_back({"zero_points",
+                                     [name = csv.name(), points, lines](const Face& face) {
+                                       return fmt::format(
+                                           "{}: {} of {} points are exactly zero, taken as missing and left out: {}",
+                                           face.table(name), lines.size(), points, face.rows(lines));
+                                     },
+                                     lines});
   }
 }
 

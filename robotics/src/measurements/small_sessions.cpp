@@ -66,11 +66,16 @@ Measurements without_small_sessions(const Measurements& measurements) {
   large.warnings = measurements.warnings;
   large.unused_columns = measurements.unused_columns;
   const bool are_sessions = std::ranges::none_of(told, [](const auto& entry) { return is_touched(entry.first); });
-  large.warnings.push_back(
-      fmt::format("{} of {} {} left out, too few points in each to find where {}: {} ({}{} {})", left_out.size(),
-                  told.size(), are_sessions ? "sessions" : "sessions, sockets, planes and spheres",
-                  are_sessions ? "the instrument stood" : "it is", fmt::join(left_out, ", "),
-                  has_lines ? "line" : "row", lines.size() == 1 ? "" : "s", fmt::join(lines, ", ")));
+  const std::string said =
+      fmt::format("{} of {} {} left out, too few points in each to find where {}: {}", left_out.size(), told.size(),
+                  are_sessions ? "sessions" : "sessions, sockets, planes and spheres",
+                  are_sessions ? "the instrument stood" : "it is", fmt::join(left_out, ", "));
+  large.warnings.push_back({"small_sessions",
+                            [=](const Face& face) {
+                              return fmt::format("{} ({})", said,
+                                                 has_lines ? face.rows(lines) : numbered("row", lines));
+                            },
+                            lines});
   return large;
 }
 

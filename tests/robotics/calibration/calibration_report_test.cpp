@@ -91,7 +91,7 @@ TEST(CalibrationReport, DescriptionOfAnotherRobotIsSaidNotToBelong) {
   for (const int folds : {0, 5}) {
     const auto mistakes_of = [&](const Robot& measured) {
       const Measurements seen = measure(measured, random_poses(measured.chain, 60, 17), 0.05, 18);
-      return input_mistakes(ur_like(), seen, report_calibration(ur_like(), seen, {.folds = folds}));
+      return words(input_mistakes(ur_like(), seen, report_calibration(ur_like(), seen, {.folds = folds})), {});
     };
     const std::vector<std::string> wrong = mistakes_of(other);
     ASSERT_FALSE(wrong.empty());
@@ -105,7 +105,7 @@ TEST(CalibrationReport, SoFewPosesThatAnyValuesFitAreSaid) {
   const Robot truth = perturbed(ur_like(), 0.5, 0.05, 19);
   const auto mistakes_of = [&](Eigen::Index poses) {
     const Measurements seen = measure(truth, random_poses(truth.chain, poses, 20), 0.05, 21);
-    return input_mistakes(ur_like(), seen, report_calibration(ur_like(), seen));
+    return words(input_mistakes(ur_like(), seen, report_calibration(ur_like(), seen)), {});
   };
   const std::vector<std::string> few = mistakes_of(11);
   ASSERT_EQ(few.size(), 1U);
@@ -119,17 +119,19 @@ TEST(CalibrationReport, ACalibrationWithoutGainOnUnseenPosesIsSaid) {
   const Measurements seen = measure(truth, random_poses(truth.chain, 40, 23), 0.05, 24);
   const CalibrationReport report = report_calibration(ur_like(), seen);
   ASSERT_GE(report.geometric.held_out_mm.mean(), report.nominal.held_out_mm.mean());
-  EXPECT_EQ(
-      input_mistakes(ur_like(), seen, report),
-      std::vector<std::string>{"on poses left out the calibrated robot is no better than the described one: keep the "
-                               "description, or measure more poses"});
+  const std::vector<Finding> found = input_mistakes(ur_like(), seen, report);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].code, "no_gain");
+  EXPECT_TRUE(found[0].is_mistake);
+  EXPECT_EQ(found[0].words({}),
+            "on poses left out the calibrated robot is no better than the described one: keep the description, or "
+            "measure more poses");
 }
 
 // The last of the mistakes named; empty: none.
 std::string last_mistake(const Robot& described, const Measurements& seen) {
-  const std::vector<std::string> found =
-      input_mistakes(described, seen, report_calibration(described, seen, {.folds = 0}));
-  return found.empty() ? std::string() : found.back();
+  const std::vector<Finding> found = input_mistakes(described, seen, report_calibration(described, seen, {.folds = 0}));
+  return found.empty() ? std::string() : found.back().words({});
 }
 
 TEST(CalibrationReport, UnitsThatWouldFitAreNamed) {

@@ -18,7 +18,7 @@ std::string said_after(const std::function<void(Measurements&)>& wrong) {
   wrong(seen);
   const CalibrationReport report = report_calibration(ur_like(), seen, {.folds = 0});
   std::string all;
-  for (const std::string& mistake : input_mistakes(ur_like(), seen, report)) all += mistake + "\n";
+  for (const Finding& mistake : input_mistakes(ur_like(), seen, report)) all += mistake.words({}) + "\n";
   return all;
 }
 
@@ -61,7 +61,7 @@ TEST(LikelyMistake, TheUnitOfOneTargetIsNamed) {
       read_off(truth, looked_at(random_poses(truth.chain, 60, 7), {{}, {.tool = "t2"}, {.tool = "t3"}}), 0.05, 8);
   for (Eigen::Index i = 1; i < seen.count(); i += 3) seen.positions_mm.row(i) *= 0.001;
   const CalibrationReport report = report_calibration(ur_like(), seen, {.folds = 0});
-  const std::vector<std::string> said = input_mistakes(ur_like(), seen, report);
+  const std::vector<std::string> said = words(input_mistakes(ur_like(), seen, report), {});
   EXPECT_NE(said.back().find("the points of target \"t2\" are metres"), std::string::npos) << said.back();
 }
 
@@ -79,7 +79,7 @@ TEST(LikelyMistake, TheOrderOfQuaternionsAndTheirDirectionAreNamed) {
     seen = with_orientations(seen, truth.chain);
     const CalibrationReport report = report_calibration(ur_like(), seen, {.folds = 0});
     std::string all;
-    for (const std::string& mistake : input_mistakes(ur_like(), seen, report)) all += mistake + "\n";
+    for (const Finding& mistake : input_mistakes(ur_like(), seen, report)) all += mistake.words({}) + "\n";
     return std::to_string(static_cast<int>(is_implausible(ur_like(), report))) + all;
   };
   using Q = Eigen::Quaterniond;
@@ -99,7 +99,8 @@ std::string far_of(const std::vector<double>& errors) {
   measurements.poses.joints.setZero(count, 1);
   CalibrationReport report;
   report.geometric.in_sample_mm = Eigen::Map<const Eigen::VectorXd>(errors.data(), count);
-  return far_readings(measurements, report);
+  const std::optional<Finding> found = far_readings(measurements, report);
+  return found ? found->words({}) : "";
 }
 
 std::vector<double> normal_errors(Random& random, int count) {

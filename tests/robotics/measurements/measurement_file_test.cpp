@@ -65,8 +65,8 @@ TEST(MeasurementFile, MissingPointsWrittenAsZerosAreLeftOutWithTheirLines) {
       parse_measurements("q1_deg,q2_mm,x_mm,y_mm,z_mm\n1,2,3,4,5\n1,2,0,0,0\n1,2,0,4,0\n1,2,0,0,0\n", "m.csv", two());
   EXPECT_EQ(m.count(), 2);
   ASSERT_EQ(m.warnings.size(), 1u);
-  EXPECT_NE(m.warnings[0].find("2 of 4 points"), std::string::npos);
-  EXPECT_NE(m.warnings[0].find("lines 3, 5"), std::string::npos);
+  EXPECT_NE(m.warnings[0].words({}).find("2 of 4 points"), std::string::npos);
+  EXPECT_NE(m.warnings[0].words({}).find("lines 3, 5"), std::string::npos);
   EXPECT_THROW(parse_measurements("q1_deg,q2_mm,x_mm\n1,2,0\n", "m.csv", two()), std::runtime_error);
 }
 

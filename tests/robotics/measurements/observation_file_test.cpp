@@ -45,7 +45,7 @@ TEST(ObservationFile, EveryTargetOfAPoseIsAReadingAndSomeMayBeMissing) {
   EXPECT_EQ(m.poses.covariates.at("payload_kg")(2), 0.6);
   EXPECT_EQ(pose_labels(m.poses), (std::vector<double>{0.0, 0.0, 1.0, 2.0}));
   ASSERT_EQ(m.warnings.size(), 1u);
-  EXPECT_NE(m.warnings[0].find("line 4"), std::string::npos) << m.warnings[0];
+  EXPECT_NE(m.warnings[0].words({}).find("line 4"), std::string::npos) << m.warnings[0].words({});
 }
 
 TEST(ObservationFile, LongFormatAndSessionsNameTheirFrames) {
@@ -124,18 +124,20 @@ TEST(ObservationFile, StatedUncertaintiesBecomeStandardDeviations) {
 TEST(ObservationFile, ColumnsThatLookMeantAreNamedOnce) {
   const Measurements m = read("q1_deg,q2_mm,x_mm,SMR_ID,torque_1,torque_2,Temperature\n1,2,3,a,1,2,20\n");
   ASSERT_EQ(m.warnings.size(), 3u);
-  EXPECT_NE(m.warnings[0].find("\"SMR_ID\""), std::string::npos) << m.warnings[0];
-  EXPECT_NE(m.warnings[0].find("name it target"), std::string::npos) << m.warnings[0];
+  EXPECT_NE(m.warnings[0].words({}).find("\"SMR_ID\""), std::string::npos) << m.warnings[0].words({});
+  EXPECT_NE(m.warnings[0].words({}).find("name it target"), std::string::npos) << m.warnings[0].words({});
   EXPECT_EQ(m.unused_columns.size(), 4u);
 }
 
 TEST(ObservationFile, AnIncompleteOrientationAndATargetThatWasNeverSeenAreSaid) {
   const Measurements partial = read("q1_deg,q2_mm,x_mm,qw,qx,qy\n1,2,3,1,0,0\n");
   ASSERT_EQ(partial.warnings.size(), 1u);
-  EXPECT_NE(partial.warnings[0].find("there is no column qz"), std::string::npos) << partial.warnings[0];
+  EXPECT_NE(partial.warnings[0].words({}).find("there is no column qz"), std::string::npos)
+      << partial.warnings[0].words({});
   const Measurements unseen = read("q1_deg,q2_mm,t1_x_mm,t2_x_mm\n1,2,3,\n2,3,4,\n");
   ASSERT_EQ(unseen.warnings.size(), 1u);
-  EXPECT_NE(unseen.warnings[0].find("target t2 was never seen"), std::string::npos) << unseen.warnings[0];
+  EXPECT_NE(unseen.warnings[0].words({}).find("target t2 was never seen"), std::string::npos)
+      << unseen.warnings[0].words({});
 }
 
 // A long table may be sorted by target.
@@ -214,10 +216,12 @@ TEST(SmallSessions, AreLeftOutAndNamedWithTheirLines) {
   const Measurements left = without_small_sessions(few);
   EXPECT_EQ(left.count(), 5);
   ASSERT_EQ(left.warnings.size(), 1U);
-  EXPECT_NE(left.warnings[0].find("1 of 2 sessions left out"), std::string::npos) << left.warnings[0];
-  EXPECT_NE(left.warnings[0].find("tuesday (lines 7, 8, 9)"), std::string::npos) << left.warnings[0];
+  EXPECT_NE(left.warnings[0].words({}).find("1 of 2 sessions left out"), std::string::npos)
+      << left.warnings[0].words({});
+  EXPECT_NE(left.warnings[0].words({}).find("tuesday (lines 7, 8, 9)"), std::string::npos)
+      << left.warnings[0].words({});
   few.lines.clear();  // made by a program
-  EXPECT_NE(without_small_sessions(few).warnings[0].find("(rows 6, 7, 8)"), std::string::npos);
+  EXPECT_NE(without_small_sessions(few).warnings[0].words({}).find("(rows 6, 7, 8)"), std::string::npos);
   const Measurements enough = parse_measurements(table(4), "m.csv", robot);
   EXPECT_EQ(without_small_sessions(enough).count(), 9);
   EXPECT_TRUE(without_small_sessions(enough).warnings.empty());
@@ -241,9 +245,10 @@ TEST(SmallSessions, AreJudgedByWhatThereIsToFindOfASocketAPlaneAndASphere) {
     const Measurements left = kept_of(one.too_few);
     EXPECT_EQ(left.count(), 20) << one.column;
     ASSERT_EQ(left.warnings.size(), 1U);
-    EXPECT_NE(left.warnings[0].find("1 of 2 sessions, sockets, planes and spheres left out"), std::string::npos)
-        << left.warnings[0];
-    EXPECT_NE(left.warnings[0].find("small (line"), std::string::npos) << left.warnings[0];
+    EXPECT_NE(left.warnings[0].words({}).find("1 of 2 sessions, sockets, planes and spheres left out"),
+              std::string::npos)
+        << left.warnings[0].words({});
+    EXPECT_NE(left.warnings[0].words({}).find("small (line"), std::string::npos) << left.warnings[0].words({});
     EXPECT_EQ(kept_of(one.too_few + 1).count(), 20 + one.too_few + 1) << one.column;
   }
 }

@@ -148,7 +148,8 @@ TEST(ReferencePoints, TakeTheDriftOffPointsAndOrientations) {
   for (std::size_t i = 0; i < turned.size(); ++i) EXPECT_LT((turned[i] - tools[i].rotation).norm(), 1e-7) << i;
   // 0.23 mm of shift and 0.2 mrad at about 1 m.
   ASSERT_EQ(m.warnings.size(), 1u);
-  EXPECT_NE(m.warnings[0].find("in 6 rounds is taken off: up to 0."), std::string::npos) << m.warnings[0];
+  EXPECT_NE(m.warnings[0].words({}).find("in 6 rounds is taken off: up to 0."), std::string::npos)
+      << m.warnings[0].words({});
   EXPECT_EQ(m.lines.front(), 6);
   EXPECT_EQ(m.lines[12], 22);
 }
@@ -159,7 +160,8 @@ TEST(ReferencePoints, LeaveAnInstrumentAtRestAlone) {
   const Measurements m = parse_measurements(file.text, "m.csv", robot);
   EXPECT_LT((m.positions_mm - file.still).cwiseAbs().maxCoeff(), 1e-12);
   ASSERT_EQ(m.warnings.size(), 1u);
-  EXPECT_NE(m.warnings[0].find("no drift of the instrument (they scatter by 0.0"), std::string::npos) << m.warnings[0];
+  EXPECT_NE(m.warnings[0].words({}).find("no drift of the instrument (they scatter by 0.0"), std::string::npos)
+      << m.warnings[0].words({});
 }
 
 TEST(ReferencePoints, ThatCannotBeUsedAreNamed) {
@@ -167,7 +169,7 @@ TEST(ReferencePoints, ThatCannotBeUsedAreNamed) {
   const std::string header = "q1_deg,x_mm,y_mm,z_mm,reference\n";
   const auto message = [&](const std::string& text) {
     try {
-      return parse_measurements(text, "m.csv", robot).warnings.at(0);
+      return parse_measurements(text, "m.csv", robot).warnings.at(0).words({});
     } catch (const std::runtime_error& error) {
       return std::string(error.what());
     }

@@ -11,7 +11,7 @@ import numpy as np
 
 from llmt._files import write_text
 from llmt._frames import table_of
-from llmt._results import Findings, Result, axes_of, draw_points, html_table
+from llmt._results import Findings, Result, axes_of, document_tables, draw_points, html_table
 from llmt.robotics._csv import frame_of
 from llmt.robotics._robot import Robot, RobotWarning
 
@@ -70,10 +70,15 @@ class _WithRobot(_RobotResult):
 class Calibration(_WithRobot):
     """A calibrated robot. ``print`` shows the page of ``llmt-robot calibrate``."""
 
+    def __init__(self, made: Mapping[str, Any]) -> None:
+        super().__init__(made)
+        self._document = json.loads(made["document"])
+
     @property
     def summary(self) -> str:
         """How far the error fell, in a sentence."""
-        return self._text.split("\n", 2)[1]
+        answer: str = self._document["answer"]
+        return answer
 
     @property
     def parameters(self) -> Any:
@@ -94,12 +99,7 @@ class Calibration(_WithRobot):
         return "on poses left out of the fit" if self._data["folds"] else "on the poses fitted"
 
     def _html_tables(self) -> list[str]:
-        rows = []
-        for model, entry in self._data["errors"].items():
-            for poses, figures in entry.items():
-                if figures is not None:
-                    rows.append([model, poses, figures["mean"], figures["p95"], figures["max"]])
-        return [html_table(["model", "error on", "mean", "95 %", "largest"], rows)]
+        return document_tables(self._document)
 
 
 class Discovery(_WithRobot, Findings):
@@ -164,6 +164,7 @@ class Check(_RobotResult):
 
     def __init__(self, made: Mapping[str, Any]) -> None:
         super().__init__(made)
+        self._summary: str = made["summary"]
         self._errors: list[float] = made["errors"]
 
     @property
@@ -177,7 +178,7 @@ class Check(_RobotResult):
     @property
     def summary(self) -> str:
         """Still good or not, with the error and the limit."""
-        return self._text.split("\n\n")[1].split("\n", 1)[0]
+        return self._summary
 
     def _html_tables(self) -> list[str]:
         rows = [

@@ -62,27 +62,6 @@ def _checked(source: Source, columns: Any, arm: Any) -> Source:
     return source
 
 
-def _minus_two(lines: str) -> str:
-    """The rows, counted from 0, of lines below a header."""
-    return re.sub("[0-9]+", lambda line: str(int(line[0]) - 2), lines)
-
-
-def _on_the_page(made: dict[str, Any], source: Source) -> list[str]:
-    """What the page of a calibration warns of, in the words of Python: rows of a table in memory count from 0."""
-    said = []
-    for sentence in json.loads(made["json"])["warnings"]:
-        if "--robust" in sentence:
-            sentence = sentence.replace("--robust leaves", "robust=True leaves")
-            if source[1] is not None:
-                sentence = re.sub(r"\(lines?( [^)]*)\)", lambda of: f"(row{_minus_two(of[1])})", sentence)
-        said.append(sentence)
-    for line in made["text"].split("\n"):
-        sentence = line.removeprefix("WARNING: ")
-        if sentence != line and sentence not in said:
-            said.append(sentence)
-    return [sentence for sentence in said if sentence not in made["warnings"]]
-
-
 def _common_scale(made: dict[str, Any], arm: Any) -> list[str]:
     """A remark where all identified lengths of 10 mm or more changed by one factor, of more than 0.3 % and beyond three
     standard errors: then a scale error of the instrument looks the same."""
@@ -208,7 +187,7 @@ def calibrate(
         page=report is not None,
         report=progress,
     )
-    made["warnings"] = [*made["warnings"], *_on_the_page(made, given), *_common_scale(made, arm)]
+    made["warnings"] += _common_scale(made, arm)
     _write_page(report, made)
     return Calibration(_warned(made))
 
@@ -315,9 +294,9 @@ def check(
             report=None,
         )
     except ValueError as error:
-        if "it was not calibrated" in str(error):
-            raise ValueError(f"{error}; calibrate it first: check(calibrate(arm, measured).robot, new)") from None
-        raise
+        if "identified" in arm.to_dict():
+            raise
+        raise ValueError(f"{error}; calibrate it first: check(calibrate(arm, measured).robot, new)") from None
     return Check(_warned(made))
 
 
@@ -435,10 +414,6 @@ def compensate(
         tolerance_um=number("tolerance_um", tolerance_um, _SMALLEST, _LARGEST),
         report=progress,
     )
-    made["warnings"] = [
-        "targets: they are poses of the tool, so nominal is not needed and not used" if "is not read" in said else said
-        for said in made["warnings"]
-    ]
     return Commands(_warned(made))
 
 

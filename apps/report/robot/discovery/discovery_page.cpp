@@ -157,7 +157,8 @@ std::string effect_values(const Discovery& found, const FoundEffect& effect) {
   return fmt::format("{}", fmt::join(values, ", "));
 }
 
-std::string discovery_page(const Discovery& found, const std::vector<Eigen::Index>& lines_of_file, std::size_t width) {
+std::string discovery_page(const Discovery& found, const std::vector<Eigen::Index>& lines_of_file, std::size_t width,
+                           const Face& face) {
   constexpr std::size_t indent = 4;
   std::vector<std::string> lines;
   const auto add = [&](const std::string& text) {
@@ -178,12 +179,12 @@ std::string discovery_page(const Discovery& found, const std::vector<Eigen::Inde
   std::swap(lines, body);
   for (const std::string& sentence : error_sentences(found)) add(sentence);
   if (!found.outliers.empty()) {
-    std::vector<std::string> rows;
-    for (const Eigen::Index row : found.outliers) rows.push_back(std::to_string(lines_of_file[row]));
+    std::vector<Eigen::Index> outliers;
+    for (const Eigen::Index row : found.outliers) outliers.push_back(lines_of_file[row]);
     constexpr std::size_t shown = 20;
-    const std::size_t more = rows.size() > shown ? rows.size() - shown : 0;
-    rows.resize(rows.size() - more);
-    add(fmt::format("Outliers, left out: line{} {}{}", rows.size() == 1 ? "" : "s", fmt::join(rows, ", "),
+    const std::size_t more = outliers.size() > shown ? outliers.size() - shown : 0;
+    outliers.resize(outliers.size() - more);
+    add(fmt::format("Outliers, left out: {}{}", face.rows(outliers),
                     more > 0 ? fmt::format(" and {} more", more) : ""));
   }
   if (!found.still.empty()) add(still_text(found.still));

@@ -11,9 +11,9 @@
 namespace llmt::report {
 
 /// What was found, in the words of an engineer who has to act on it: at most 24 lines of at most 100 columns, or
-/// `width` if that is less, then details. `lines_of_file`: of the measurements, row by row.
+/// `width` if that is less, then details. `lines_of_file`: of the measurements, row by row, which `face` names.
 std::string discovery_page(const robotics::Discovery& found, const std::vector<Eigen::Index>& lines_of_file,
-                           std::size_t width = no_width_limit);
+                           std::size_t width = no_width_limit, const Face& face = {});
 
 /// Everything else that is known: values, patterns, where the gap is, what could not be tested.
 std::string discovery_details(const robotics::Discovery& found);

@@ -19,7 +19,7 @@ namespace {
 // Says what `calibrate` would say of measurements that the description cannot mean.
 void warn_of_misfit(const robotics::Robot& robot, const robotics::Measurements& data, const Warn& warn) {
   const robotics::CalibrationReport calibrated = robotics::report_calibration(robot, data, {.folds = 0});
-  for (const std::string& mistake : robotics::input_mistakes(robot, data, calibrated)) warn("WARNING: " + mistake);
+  std::ranges::for_each(robotics::input_mistakes(robot, data, calibrated), warn);
 }
 
 // discover(); where it refuses the measurements, what looks wrong with them is said first.
@@ -90,7 +90,7 @@ DiscoveryRun run_discovery(const robotics::Robot& described, const robotics::Mea
   if (read_test) test = read_test(run.robot);
   check_positions(task.robot_file, run.robot, measured.poses);
   if (test) check_positions(task.robot_file, run.robot, test->poses);
-  for (const std::string& warning : measured.warnings) warn(warning);
+  std::ranges::for_each(measured.warnings, warn);
   run.found = discovered(run.robot, measured, test, task.options, warn);
   const Progress progress = std::exchange(task.options.progress, {});
   warn_of_misfit(run.robot, measured, warn);  // what cannot be calibrated was refused
@@ -99,12 +99,13 @@ DiscoveryRun run_discovery(const robotics::Robot& described, const robotics::Mea
   return run;
 }
 
-std::string discovery_text(const DiscoveryRun& run, const std::string& data, std::size_t width) {
-  std::string text = fmt::format("{}: {} of {}, {} {} set aside\n{}\n", data, counts_of(run.measurements),
-                                 run.robot.chain.name, run.has_test ? 0 : run.found.held_out.poses,
-                                 run.measurements.poses.observations.empty() ? "of them" : "poses",
-                                 use_of_orientations(run.measurements));
-  text += discovery_page(run.found, run.measurements.lines, width);
+std::string discovery_text(const DiscoveryRun& run, const std::string& data, std::size_t width, const Face& face) {
+  const std::string use = use_of_orientations(run.measurements, face);
+  std::string text =
+      fmt::format("{}: {} of {}, {} {} set aside\n{}{}\n", face.table(data), counts_of(run.measurements),
+                  run.robot.chain.name, run.has_test ? 0 : run.found.held_out.poses,
+                  run.measurements.poses.observations.empty() ? "of them" : "poses", use, use.empty() ? "" : "\n");
+  text += discovery_page(run.found, run.measurements.lines, width, face);
   text += next_poses_text(run.next);
   if (run.folds) {
     text += fmt::format("{} {} folds, everything found anew in each: {:.4f} -> {:.4f} mm mean on the poses left out\n",

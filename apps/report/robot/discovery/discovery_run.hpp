@@ -53,7 +53,8 @@ DiscoveryRun run_discovery(const robotics::Robot& described, const robotics::Mea
                            DiscoveryTask task, const Warn& warn);
 
 /// For people. `data`: the name of the table of measurements.
-std::string discovery_text(const DiscoveryRun& run, const std::string& data, std::size_t width = no_width_limit);
+std::string discovery_text(const DiscoveryRun& run, const std::string& data, std::size_t width = no_width_limit,
+                           const Face& face = {});
 
 /// discovery_json() with the cross-validation.
 Json discovery_run_json(const DiscoveryRun& run);

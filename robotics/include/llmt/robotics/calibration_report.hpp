@@ -73,18 +73,18 @@ struct CalibrationReport {
   CorrectedRobot best() const;
 };
 
-/// Likely mistakes in description or measurements, which are no errors of the robot, in sentences: poses beyond the
+/// Likely mistakes in description or measurements, which are no errors of the robot: poses beyond the
 /// joint limits of the description; a mean error of more than a fiftieth of the arm's length, as wrong units, signs,
 /// zeros or another robot give, before calibration or even after it, with the units that would fit; too few poses for
 /// the parameters; no gain on poses left out. Empty: nothing looks wrong.
-std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& measurements,
-                                        const CalibrationReport& report);
+std::vector<Finding> input_mistakes(const Robot& robot, const Measurements& measurements,
+                                    const CalibrationReport& report);
 
 /// Names the readings, at most a twentieth of all (or three, of 24 or more), that lie more than eight times as far off
-/// as the median and make a quarter of the squared error or more, by their lines; empty if there are none. Where the
+/// as the median and make a quarter of the squared error or more, by their lines; nothing if there are none. Where the
 /// errors have a long tail, they are also farther than four standard deviations of lognormal errors with the median and
 /// the 85 % quantile of these. calibrate_robustly() leaves such readings out.
-std::string far_readings(const Measurements& measurements, const CalibrationReport& report);
+std::optional<Finding> far_readings(const Measurements& measurements, const CalibrationReport& report);
 
 /// Whether the calibrated robot still misses half of the measured points by more than a fiftieth of the nominal arm's
 /// length: the identified values mean nothing then.

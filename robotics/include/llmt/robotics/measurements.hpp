@@ -15,6 +15,7 @@
 
 #include "llmt/abi.hpp"
 #include "llmt/csv.hpp"
+#include "llmt/finding.hpp"
 #include "llmt/robotics/robot.hpp"
 
 namespace llmt::robotics {
@@ -38,7 +39,7 @@ struct Measurements {
   std::string target;                                 ///< that the chain's own tool stands for; empty: none was named
   std::vector<Eigen::Index> lines;                    ///< of the file, row by row; empty without a file
   std::vector<std::string> unused_columns;            ///< columns of the file that are not used
-  std::vector<std::string> warnings;                  ///< for people, e.g. rows left out because the point is missing
+  std::vector<Finding> warnings;                      ///< for people, e.g. rows left out because the point is missing
 
   Eigen::Index count() const { return poses.count(); }
 };
