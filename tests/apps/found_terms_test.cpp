@@ -11,8 +11,8 @@
 #include "llmt/csv.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "llmt/random.hpp"
-#include "trees/term_file.hpp"
 #include "report/terms/terms_summary.hpp"
+#include "trees/term_file.hpp"
 
 namespace {
 

@@ -88,8 +88,8 @@ struct BoostResult {
 /// to all rows with a quarter more trees, if more than a twentieth was held out. With TrainingData::held_out these rows
 /// decide instead, and the sum of the other rows is the result. Where each fifth is held out in turn, the sum is a
 /// weighted mean of two variants and one tree, as fit() makes it; its error is that of the whole procedure, shares and
-/// number of trees chosen without the row. With more rows it is the mean of the sum and such a tree where the tree alone
-/// is better than the sum on the held-out rows.
+/// number of trees chosen without the row. With more rows it is the mean of the sum and such a tree where the tree
+/// alone is better than the sum on the held-out rows.
 ///
 /// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
 ///
