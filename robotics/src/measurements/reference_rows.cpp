@@ -133,7 +133,7 @@ double move_back(const Session& session, const Drift& drift, std::vector<Eigen::
   return greatest;
 }
 
-std::string rows_of(const std::vector<ReferenceReading>& readings, const Face& face) {
+std::string words_of_rows(const std::vector<ReferenceReading>& readings, const Face& face) {
   std::string text;
   for (const ReferenceReading& reading : readings) {
     text += fmt::format("{}{} (\"{}\")", text.empty() ? "" : ", ", face.rows({reading.line}), reading.point);
@@ -178,7 +178,7 @@ void take_off_drift(const Csv& csv, const ReferenceRows& split, const Robot& rob
     const std::string of = session.name.empty() ? "" : fmt::format("session \"{}\": ", session.name);
     const auto say = [&](const char* code, const std::string& text, const std::vector<ReferenceReading>& about = {}) {
       Finding said = {code, [name = csv.name(), of, text, about](const Face& face) {
-                        return fmt::format("{}: {}{}{}", face.table(name), of, text, rows_of(about, face));
+                        return fmt::format("{}: {}{}{}", face.table(name), of, text, words_of_rows(about, face));
                       }};
       for (const ReferenceReading& reading : about) said.lines.push_back(reading.line);
       measurements.warnings.push_back(std::move(said));

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <string>
 
+#include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 
 namespace alternatives_test {

@@ -10,6 +10,7 @@
 #include "discovery/terms/alternatives.hpp"
 #include "discovery/terms/approximations.hpp"
 #include "discovery/terms/missing_findings.hpp"
+#include "llmt/discovery/simulation.hpp"
 #include "search_cases.hpp"
 
 namespace answers_test {
