@@ -31,7 +31,7 @@ TEST(Range, EveryNumberOfAProgramHasOne) {
   EXPECT_EQ(start_with(std::string("text")), 0);
   CLI::App app("", "program");
   double number = 0.0;
-  llmt::apps::add_number(app, "--number", number, llmt::apps::any_share, "");
+  llmt::apps::add_number(app, "--number", number, llmt::any_share, "");
   EXPECT_EQ(start(app), 0);
 }
 

@@ -3,7 +3,8 @@
 /// bindings, states of a distributed fit, streams and sums of trees. An option is added by a member of FitOptions and
 /// its entry in for_each_field() below; without the entry, or with a part of it missing, nothing compiles.
 ///
-///     llmt::for_each_field(options, [](const llmt::OptionField& field, const auto& value) {
+///     const llmt::FitOptions defaults;
+///     llmt::for_each_field(defaults, [](const llmt::OptionField& field, const auto&) {
 ///       std::printf("%s\n", field.name.data());  // "max_leaves"
 ///     });
 #pragma once
