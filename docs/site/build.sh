@@ -18,14 +18,15 @@ rm -r $pages/site
 cp docs/site/mkdocs.yml build/site
 cp CONTRIBUTING.md CHANGELOG.md CITATION.cff LICENSE $pages
 cp README.md $pages/index.md
-for linked in bench/logs/tx40.py cmake/packages cmake/setup robotics/catalogue.yaml tests/CMakeLists.txt tests/consumer \
-  tests/bytes/manifest.txt tests/measures/table.md tests/python/requirements.txt; do
+for linked in bench/distributed/mpi/README.md bench/logs/tx40.py cmake/setup robotics/catalogue.yaml \
+  tests/CMakeLists.txt tests/consumer tests/bytes/manifest.txt tests/measures/table.md tests/python/requirements.txt; do
   mkdir -p "$pages/${linked%/*}"
   cp -r $linked $pages/$linked
 done
 sed -i 's#](docs/#](#g; s#](\.\./#](#g; s#](README\.md#](index.md#g' $pages/*.md
+sed -i 's#](\.\./\.\./bench#](../bench#g' $pages/algorithms/*.md
 # A link to a folder leads to the list of its files.
-for folder in cmake/packages examples/python samples tests/consumer; do
+for folder in examples/python samples tests/consumer; do
   {
     printf '# Files of %s\n\n' $folder
     (cd $pages/$folder && find . -type f | sort | sed 's#^\./\(.*\)#- [\1](\1)#')
