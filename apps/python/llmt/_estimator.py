@@ -173,12 +173,13 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         """Learns from further rows as they come, in memory that does not depend on their number.
 
         The tree is grown by a stream's rules (docs/algorithms), not by `fit`; a call after `fit` starts anew. Inputs
-        are numbers. Of the parameters a stream takes `max_leaves`, `min_samples_leaf` and `validity`.
+        are numbers. A stream takes the parameters `max_leaves`, `min_samples_leaf` and `validity`; `n_jobs`,
+        `random_state`, `select_features` and `integer_codes` change nothing.
 
         Raises
         ------
         ValueError
-            For rows that cannot be learned from, and for a parameter that was given and that a stream does not take.
+            For rows that cannot be learned from, and for any other parameter whose value is not its default.
         """
         stream: StreamModel | None = getattr(self, "_stream", None)
         if stream is not None:

@@ -54,8 +54,8 @@ def start(
     branch_rows : int
         Branches of the tree with at most this number of rows are brought into one memory and fitted there. A table
         that has no more rows becomes the model of `LocalLinearTreeRegressor.fit`, to the byte. No fewer than
-        `sample_rows`. In larger tables no number is taken for a code, and
-        only the tree of the sample leaves out inputs.
+        `sample_rows`. In larger tables no number is taken for a code, and only the tree of the sample leaves out
+        inputs.
     sample_rows : int
         Rows of the sample that the first pass brings into one memory: a first tree is grown from it.
     block_rows : int
