@@ -73,7 +73,7 @@ struct BoostResult {
 
 /// Fits a sum of trees to each output.
 ///
-/// The number of rows decides how (docs/algorithms/boosting.md says what the columns are):
+/// The number of rows decides how. docs/algorithms/boosting.md explains the columns.
 ///
 /// | rows from | rate | slopes | c | patience | held out | race | one tree | splits from |
 /// | --- | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -84,9 +84,9 @@ struct BoostResult {
 /// | 50 000 | 0.07 | 5 | 1 | 50 | a fifth | yes | none | all rows |
 /// | 100 001 | 0.1 | 5 | 1 | 50 | about 20 000 | yes | none | 250 000 rows |
 ///
-/// Whole groups of rows are held out. They decide which trees are taken and when boosting stops. Then the sum is fitted
-/// to all rows with a quarter more trees, if more than a twentieth was held out. With TrainingData::held_out these rows
-/// decide instead, and the sum of the other rows is the result. Where each fifth is held out in turn, the sum is a
+/// Whole groups of rows are held out. The held-out rows decide which trees are taken and when boosting stops. Then the
+/// sum is fitted to all rows with a quarter more trees, if more than a twentieth was held out. With
+/// TrainingData::held_out these rows decide instead, and the sum of the other rows is the result. Where each fifth is held out in turn, the sum is a
 /// weighted mean of two variants and one tree, as fit() makes it; its error is that of the whole procedure, shares and
 /// number of trees chosen without the row. With more rows it is the mean of the sum and such a tree where the tree
 /// alone is better than the sum on the held-out rows.

@@ -8,7 +8,7 @@
 namespace llmt {
 namespace {
 
-// docs/algorithms/boosting.md says on which tables these were chosen.
+// docs/benchmarks.md, "Sums of trees", says on which tables these were chosen.
 constexpr int race_rounds = 50;
 constexpr double race_rate = 0.3;
 constexpr std::size_t most_paired = 4;  // inputs whose sums and differences are tried

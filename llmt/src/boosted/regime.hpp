@@ -1,5 +1,5 @@
 /// \file
-/// What the numbers of rows and inputs decide in a sum of trees.
+/// The table of what the numbers of rows and inputs decide in a sum of trees.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,7 +16,7 @@ inline constexpr Eigen::Index no_limit = std::numeric_limits<Eigen::Index>::max(
 inline constexpr std::array by_ra = {GrowthRule::ra};
 inline constexpr std::array by_ra_or_rd = {GrowthRule::ra, GrowthRule::rd};
 
-/// How a sum of so many rows is fitted.
+/// One line of the table: how a sum of so many rows is fitted.
 struct Regime {
   Eigen::Index rows = 0;                           ///< from so many rows on, up to the next regime
   double rate = 0.0;                               ///< RoundOptions::rate
@@ -35,8 +35,8 @@ struct Regime {
 /// From so many rows on one hold-out decides. Of fewer rows it would decide by chance, so five decide together.
 inline constexpr Eigen::Index enough_for_one_hold_out = 500;
 
-/// docs/algorithms/boosting.md and llmt/boosted.hpp have the same table, and a test compares them. The page says on
-/// which data the numbers were chosen.
+/// docs/algorithms/boosting.md and llmt/boosted.hpp have the same table, and a test compares them. docs/benchmarks.md,
+/// "Sums of trees", says on which data the numbers were chosen.
 inline constexpr std::array<Regime, 6> regimes = {{
     {fewest_boosted_rows, 0.05, 3, 3.0, 100, true, 0, false, by_ra, 100},
     {enough_for_one_hold_out, 0.05, 3, 3.0, 200, false, 0, false, by_ra_or_rd, 100},
