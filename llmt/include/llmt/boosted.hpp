@@ -86,10 +86,10 @@ struct BoostResult {
 ///
 /// Whole groups of rows are held out. The held-out rows decide which trees are taken and when boosting stops. Then the
 /// sum is fitted to all rows with a quarter more trees, if more than a twentieth was held out. With
-/// TrainingData::held_out these rows decide instead, and the sum of the other rows is the result. Where each fifth is held out in turn, the sum is a
-/// weighted mean of two variants and one tree, as fit() makes it; its error is that of the whole procedure, shares and
-/// number of trees chosen without the row. With more rows it is the mean of the sum and such a tree where the tree
-/// alone is better than the sum on the held-out rows.
+/// TrainingData::held_out these rows decide instead, and the sum of the other rows is the result. Where each fifth is
+/// held out in turn, the sum is a weighted mean of two variants and one tree, as fit() makes it; its error is that of
+/// the whole procedure, shares and number of trees chosen without the row. With more rows it is the mean of the sum and
+/// such a tree where the tree alone is better than the sum on the held-out rows.
 ///
 /// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
 ///

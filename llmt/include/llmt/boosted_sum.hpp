@@ -6,14 +6,14 @@
 
 namespace llmt {
 
-/// A number of a row that trees split on and that leaves take as a regressor: a standardised input
+/// A number of each row. Trees split on it, and leaves take it as a regressor. It is a standardised input
 /// z = (x - centre) / deviation, the sum or difference of two, or the indicator (0 or 1) of a level of a categorical
 /// input.
 struct BoostedFeature {
-  int first = 0;
-  int second = -1;    ///< -1: the input alone
-  double sign = 1.0;  ///< of the second input
-  int level = -1;     ///< -1: a number
+  int first = 0;      ///< index of the input
+  int second = -1;    ///< index of the second input; -1: there is none
+  double sign = 1.0;  ///< of the second input: 1 for the sum, -1 for the difference
+  int level = -1;     ///< index of the level; -1: the feature is a number
 
   bool operator==(const BoostedFeature&) const = default;
 };
@@ -28,32 +28,32 @@ struct BoostedLeaf {
   double constant = 0.0;
   double low = 0.0;
   double high = 0.0;
-  std::vector<int> features = {};  ///< indices into BoostedSum::features
-  std::vector<double> slopes = {};
+  std::vector<int> features = {};   ///< indices into BoostedSum::features
+  std::vector<double> slopes = {};  ///< one for each of `features`
 };
 
 /// z <= threshold of a feature goes to the left. With a half width h > 0 the rows with |z - threshold| < h go to both
 /// sides, to the right with the weight 1/2 + u (3 - u^2) / 4, u = (z - threshold) / h, unless one side would get less
 /// of the row than BoostedTree::smallest_share: then the side on which it lies takes all.
 struct BoostedSplit {
-  int feature = 0;
-  double threshold = 0.0;
-  double half_width = 0.0;
-  bool missing_left = false;
-  int left = 0;  ///< a split below this one; or -1 - k: leaf k
-  int right = 0;
+  int feature = 0;            ///< index into BoostedSum::features
+  double threshold = 0.0;     ///< in the unit of the feature
+  double half_width = 0.0;    ///< in the unit of the feature; 0: a crisp split
+  bool missing_left = false;  ///< rows without the feature go to the left
+  int left = 0;               ///< index of a split below this one; or -1 - k: leaf k
+  int right = 0;              ///< as `left`
 };
 
 /// One tree; the first split is the root. Without splits there is one leaf.
 struct BoostedTree {
   std::vector<BoostedSplit> splits;
   std::vector<BoostedLeaf> leaves;
-  double smallest_share = 0.08;  ///< from 0 to 0.5, see BoostedSplit
+  double smallest_share = 0.08;  ///< of a row on one side of a split, from 0 to 0.5; see BoostedSplit
 };
 
 /// The trees of one output: y = base + rate . sum of trees.
 struct BoostedSum {
-  double base = 0.0;
+  double base = 0.0;  ///< in the unit of the output
   double rate = 1.0;
   std::vector<BoostedFeature> features;
   std::vector<BoostedTree> trees;

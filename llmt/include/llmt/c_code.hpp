@@ -1,5 +1,5 @@
 /// \file
-/// Text of a program in C, and the names that it may have.
+/// C source that is made of a model, and the names that it may use.
 #pragma once
 
 #include <string>
@@ -7,13 +7,13 @@
 
 namespace llmt {
 
-/// A source and its header.
+/// A C source file and the header that declares its functions.
 struct CSource {
-  std::string source;
-  std::string header;
+  std::string source;  ///< text of the file .c
+  std::string header;  ///< text of the file .h
 };
 
-/// Whether a text is an identifier of C of at most 31 characters, and no keyword.
+/// True if the text is an identifier of C of at most 31 characters, and no keyword.
 bool is_c_identifier(std::string_view text);
 
 }  // namespace llmt

@@ -1,10 +1,10 @@
 /// \file
-/// How a table writes the fraction of a number.
+/// The decimal mark of the numbers in a table.
 #pragma once
 
 namespace llmt {
 
-/// What stands between the whole and the fraction of a number.
+/// The character between the whole and the fraction of a number.
 enum class DecimalMark : char { point = '.', comma = ',' };
 
 }  // namespace llmt

@@ -43,7 +43,7 @@ inline constexpr NumberRange no_number = {0.0, 0.0, ""};  ///< of options that a
 inline constexpr NumberRange whole_number = {0.0, largest_number, "a whole number, 0 or more"};
 inline constexpr NumberRange number_of_threads = {0.0, 4096.0, "a whole number from 0 to 4096"};
 
-/// What a way of fitting other than fit() does with an option. It has to be said for every option.
+/// The treatment of an option by a way of fitting other than fit(). It has to be said for every option.
 class Use {
  public:
   /// The option has the meaning that it has in fit().
@@ -73,7 +73,7 @@ class Use {
   std::string_view instead_;
 };
 
-/// Where the help of the programs lists an option.
+/// The part of the programs' help in which an option is listed: `--help`, or only `--help-all`.
 enum class Audience { everyone, experts };
 
 /// One option of a fit.
@@ -84,11 +84,11 @@ struct OptionField {
   std::string_view help;       ///< one phrase; the default is added to it
   NumberRange range;           ///< of the numbers that programs take
   bool has_default_text;       ///< default_text() says its default
-  Audience audience;
-  bool compared;      ///< `llmt compare` takes it, for all its methods
-  Use beyond_memory;  ///< distributed::start()
-  Use in_stream;      ///< stream_options()
-  Use in_sum;         ///< of `llmt fit --boost`
+  Audience audience;           ///< for whom the programs' help lists it
+  bool compared;               ///< `llmt compare` takes it, for all its methods
+  Use beyond_memory;           ///< distributed::start()
+  Use in_stream;               ///< stream_options()
+  Use in_sum;                  ///< of `llmt fit --boost`
 };
 
 /// Calls visit(field, member) for every option of a fit. `Options`: FitOptions or const FitOptions.
@@ -220,13 +220,15 @@ const std::vector<OptionField>& option_fields();
 
 /// A way of fitting that does not take every option of fit(), and how a refusal is worded.
 struct WayOfFitting {
-  std::string_view function;  ///< "llmt::distributed::start"
-  Use OptionField::*use;
-  std::string_view sentence;  ///< "is not possible beyond one memory"
+  std::string_view function;  ///< that refuses: "llmt::distributed::start"
+  Use OptionField::*use;      ///< the member that says what it does with an option
+  std::string_view sentence;  ///< behind the option: "is not possible beyond one memory"
 };
 
+/// The fit of distributed::start().
 inline constexpr WayOfFitting beyond_memory = {"llmt::distributed::start", &OptionField::beyond_memory,
                                                "is not possible beyond one memory"};
+/// The fit of a stream.
 inline constexpr WayOfFitting in_stream = {"llmt::stream_options", &OptionField::in_stream, "is not for streams"};
 
 /// An option that a way of fitting refuses. The message has the option's name as FitOptions has it; programs and
@@ -238,15 +240,15 @@ class OptionRefused : public std::invalid_argument {
         option_(option),
         rest_(rest) {}
 
-  const std::string& option() const { return option_; }  ///< "rule"
-  const std::string& rest() const { return rest_; }      ///< " retis is not possible beyond one memory; take rd"
+  const std::string& option() const { return option_; }  ///< its name: "rule"
+  const std::string& rest() const { return rest_; }      ///< behind it: " retis is not possible beyond one memory; ..."
 
  private:
   std::string option_;
   std::string rest_;
 };
 
-/// Whether two values of an option mean the same: no trends and trends of which each is Trend::any do.
+/// True if two values of an option mean the same. No trends mean the same as trends of which each is Trend::any.
 template <class Value>
 bool means_the_same(const Value& one, const Value& other) {
   if constexpr (std::is_same_v<Value, std::vector<Trend>>) {

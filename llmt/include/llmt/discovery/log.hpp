@@ -1,5 +1,5 @@
 /// \file
-/// Signals of a machine as they were recorded.
+/// The log of a machine: its positions and torques over time.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,15 +11,15 @@
 
 namespace llmt::discovery {
 
-/// Signals as they were recorded, n rows in the order of time.
+/// Signals as they were recorded. There are n rows in the order of time.
 struct Log {
   Eigen::VectorXd time;             ///< n, in s
-  Eigen::MatrixXd positions;        ///< n x p
-  Eigen::MatrixXd torques;          ///< n x k: what is filtered and not differentiated; k may be 0
-  std::vector<std::string> runs{};  ///< n names of the run of each row, the rows of a run together; empty: one run
+  Eigen::MatrixXd positions;        ///< n x p: signals that are filtered and differentiated
+  Eigen::MatrixXd torques;          ///< n x k: signals that are filtered and not differentiated; k may be 0
+  std::vector<std::string> runs{};  ///< n: the run of each row, whose rows stand together; empty: one run
 };
 
-/// A log that cannot be used.
+/// Thrown for a log that cannot be used.
 class LogError : public std::invalid_argument {
  public:
   LogError(const std::string& message, Eigen::Index row) : std::invalid_argument(message), row_(row) {}
