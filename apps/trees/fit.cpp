@@ -141,20 +141,26 @@ void fit_command(FitArguments arguments) {
   }
   std::optional<ReadableResult> readable;
   if (!arguments.readable.empty()) readable = make_readable(arguments, fitting, loss);
-  report::FitRun run{table_name(arguments.learning.data), table.options, *table.data, table.lines, arguments.output};
-  report::Document words = report::fit_words(run, result);
-  if (fitting.taught) words.sections.push_back(report::teaching_words(*fitting.taught));
-  if (readable) words.sections.push_back(report::readable_words(result, *readable, loss));
-  const std::string reports = write_fit_reports(arguments, table, fitting, readable, words);
+  const auto run_of = [&](const std::string& data, const std::string& output) {
+    return report::FitRun{data, table.options, *table.data, table.lines, output};
+  };
+  const auto words_for = [&](const std::string& output) {
+    report::Document words = report::fit_words(run_of(table_name(arguments.learning.data), output), result);
+    if (fitting.taught) words.sections.push_back(report::teaching_words(*fitting.taught));
+    if (readable) words.sections.push_back(report::readable_words(result, *readable, loss));
+    return words;
+  };
+  // A page goes to others, whom the place of the file does not concern.
+  const std::string reports = write_fit_reports(arguments, table, fitting, readable, words_for(""));
   if (arguments.json) {
-    run.data = arguments.learning.data;
+    const report::FitRun run = run_of(arguments.learning.data, arguments.output);
     Json summary = report::fit_json(run, result);
     if (fitting.taught) summary["teaching"] = report::teaching_json(*fitting.taught);
     if (readable) summary["readable"] = report::readable_json(*readable);
     print_json(summary);
     return;
   }
-  print(report::document_text(words, output_width()));
+  print(report::document_text(words_for(arguments.output), output_width()));
   if (readable && !arguments.output.empty()) {
     print(fmt::format("Readable tree written to {}; llmt inspect --rules prints it\n",
                       beside(arguments.output, readable_extension).string()));

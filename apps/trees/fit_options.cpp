@@ -107,21 +107,21 @@ std::string rules_text() {
 std::string FieldOptions::help(const OptionField& field) {
   std::string text(field.help);
   if (field.name == "rule") text += rules_text();
-  if (!field.has_default_text) return text;
-  const std::string_view option = field.name.substr(field.name.find('.') + 1);
-  return fmt::format("{} [{}]", text, default_text(option));
+  return text;
 }
 
-void FieldOptions::group(const OptionField& field, CLI::Option* option) {
+void FieldOptions::finish(const OptionField& field, CLI::Option* option) {
+  // A long one is shown by --help-all alone.
+  if (field.has_default_text) option->default_str(default_text(field.name.substr(field.name.find('.') + 1)));
   if (field.audience == Audience::experts) option->group(expert_options);
 }
 
 void FieldOptions::add_flag(const OptionField& field, const std::function<void()>& set) const {
-  group(field, command_.add_flag_callback(flag(field), set, help(field)));
+  finish(field, command_.add_flag_callback(flag(field), set, help(field)));
 }
 
 void FieldOptions::add_columns(const OptionField& field, const std::string& name, const std::string& help) const {
-  group(field, add_names(command_, name, columns_[name], "COLUMN", help));
+  finish(field, add_names(command_, name, columns_[name], "COLUMN", help));
 }
 
 void FieldOptions::add_names_of_choice(const OptionField& field, const std::vector<std::string>& names,
@@ -137,8 +137,8 @@ void FieldOptions::add_names_of_choice(const OptionField& field, const std::vect
     return true;
   };
   const std::string type = fmt::format("{}", fmt::join(names, "|"));
-  group(field,
-        add_text(command_, flag(field), type.c_str(), read, fmt::format("{} [{}]", help(field), by_default), {}));
+  finish(field,
+         add_text(command_, flag(field), type.c_str(), read, fmt::format("{} [{}]", help(field), by_default), {}));
 }
 
 void set_columns(const NamedColumns& named, const std::vector<std::string>& inputs,
@@ -158,10 +158,21 @@ void refuse_options(const CLI::App& command, const FormOfFit& form) {
     if (option->count() == 0) continue;
     const std::string name = option->get_single_name();
     const OptionField* field = field_of(name);
-    const bool is_refused = field != nullptr ? form.use != nullptr && (field->*form.use).is_refused()
-                                             : other_option(name)->forms.find(form.name) == std::string_view::npos;
+    const OtherOption* other = other_option(name);
+    const bool is_refused = field != nullptr
+                                ? form.use != nullptr && (field->*form.use).is_refused()
+                                : other == nullptr || other->forms.find(form.name) == std::string_view::npos;
     if (is_refused) throw std::invalid_argument(fmt::format("--{} {}", name, form.sentence));
   }
+}
+
+std::vector<SettingName> setting_names() {
+  std::vector<SettingName> names;
+  for (const OptionField& field : option_fields()) {
+    if (field.name == "intervals") continue;  // a word of messages, none of which means the option
+    names.push_back({field.name, field.flag});
+  }
+  return names;
 }
 
 void require_forms(const CLI::App& command) {

@@ -13,6 +13,7 @@
 
 #include "llmt/fit.hpp"
 #include "llmt/option_fields.hpp"
+#include "shared/cli.hpp"
 #include "shared/options.hpp"
 
 namespace llmt::apps {
@@ -34,18 +35,18 @@ class FieldOptions {
     } else if constexpr (std::is_enum_v<Value>) {
       add_choice(field, value);
     } else if constexpr (std::same_as<Value, std::uint64_t>) {
-      group(field, add_seed(command_, value, help(field)));
+      finish(field, add_seed(command_, value, help(field)));
     } else if constexpr (std::integral<Value>) {
       CLI::Option* option =
           field.range.high < largest_number
               ? add_count(command_, flag(field), value, Value{0}, help(field), static_cast<Value>(field.range.high))
               : add_count(command_, flag(field), value, Value{0}, help(field));
       if (!field.has_default_text) option->capture_default_str();
-      group(field, option);
+      finish(field, option);
     } else if constexpr (std::same_as<Value, double>) {
-      group(field, add_number(command_, flag(field), value, field.range, help(field)));
+      finish(field, add_number(command_, flag(field), value, field.range, help(field)));
     } else if constexpr (std::same_as<Value, std::vector<double>>) {
-      group(field, add_numbers(command_, flag(field), value, field.range, help(field)));
+      finish(field, add_numbers(command_, flag(field), value, field.range, help(field)));
     } else if constexpr (std::same_as<Value, Columns>) {
       add_columns(field, flag(field), help(field));
     } else {
@@ -59,7 +60,7 @@ class FieldOptions {
  private:
   static std::string flag(const OptionField& field) { return std::string(field.flag); }
   static std::string help(const OptionField& field);
-  static void group(const OptionField& field, CLI::Option* option);
+  static void finish(const OptionField& field, CLI::Option* option);
   void add_flag(const OptionField& field, const std::function<void()>& set) const;
   void add_columns(const OptionField& field, const std::string& name, const std::string& help) const;
   /// `names`: of the choices; `take` is called with the position of the one that was given.
@@ -113,6 +114,9 @@ inline constexpr FormOfFit of_files = {nullptr, "files",
 
 /// Throws std::invalid_argument for an option that was given and that this form does not take.
 void refuse_options(const CLI::App& command, const FormOfFit& form);
+
+/// How messages of the library name the options of a fit, and how commands do.
+std::vector<SettingName> setting_names();
 
 /// Throws std::logic_error for an option of the command of which is not known what forms take it.
 void require_forms(const CLI::App& command);

@@ -1,19 +1,6 @@
-#include <vector>
-
-#include "llmt/option_fields.hpp"
 #include "shared/cli.hpp"
 #include "trees/commands.hpp"
-
-namespace {
-
-// How the messages of llmt::fit() and llmt::compare() name options, and how the program does.
-std::vector<llmt::apps::SettingName> setting_names() {
-  std::vector<llmt::apps::SettingName> names;
-  for (const llmt::OptionField& field : llmt::option_fields()) names.push_back({field.name, field.flag});
-  return names;
-}
-
-}  // namespace
+#include "trees/fit_options.hpp"
 
 int main(int argc, char** argv) {
   CLI::App app{"Local linear model trees: a table in, a model you can read out.", "llmt"};
@@ -28,5 +15,5 @@ int main(int argc, char** argv) {
   llmt::apps::add_table(app);
   llmt::apps::add_discover(app);
   llmt::apps::add_export(app);
-  return llmt::apps::run(app, argc, argv, setting_names());
+  return llmt::apps::run(app, argc, argv, llmt::apps::setting_names());
 }

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "oracles/toy_options.hpp"
 #include "trees/fit_options.hpp"
@@ -45,6 +46,13 @@ TEST(ToyOption, IsReadShownAndHasItsRange) {
 TEST(ToyOption, IsNotComparedIfItsEntrySaysSo) {
   EXPECT_EQ(parse("--folds 4", true).options.folds, 4);
   EXPECT_THROW(parse("--toy 0.5", true), CLI::ExtrasError);
+}
+
+TEST(SettingNames, AWordOfAMessageIsNoOption) {
+  const std::vector<SettingName> names = setting_names();
+  EXPECT_EQ(in_words_of_user("llmt::fit: folds.count is 1", names), "--cv is 1");
+  EXPECT_EQ(in_words_of_user("llmt::to_json: a model without intervals takes less", names),
+            "a model without intervals takes less");
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ class Fitted:
         self.fit = _core.fit(
             X,
             y,
-            options,
+            {"folds.count" if name == "folds" else name: value for name, value in options.items()},
             input_names=names or [f"x{k}" for k in range(X.shape[1])],
             output_names=outputs or [f"y{k}" for k in range(y.shape[1])],
             levels=levels or [[] for _ in range(X.shape[1])],

@@ -274,6 +274,9 @@ def test_arguments_that_are_missing_or_too_many(arm, measured):
         robotics.calibrate(measured, arm)
     with pytest.raises(ValueError, match="calibrate it first"):
         robotics.check(arm, measured)
+    with pytest.raises(ValueError) as refused:
+        robotics.check(robotics.calibrate(arm, measured).robot, measured.assign(x_mm="word"))
+    assert "calibrate it first" not in str(refused.value)
     with pytest.warns(robotics.RobotWarning, match="the targets are poses: nominal is not read"):
         robotics.compensate(arm, measured[["x_mm", "y_mm", "z_mm"]].head(2), nominal=arm)
 

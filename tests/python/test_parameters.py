@@ -105,6 +105,21 @@ def test_a_stream_takes_or_refuses_a_parameter(name):
             stream.partial_fit(rows, targets)
 
 
+def test_a_stream_does_not_change_its_parameters():
+    rows = np.random.default_rng(0).uniform(-1, 1, (500, 2))
+    stream = LocalLinearTreeRegressor().partial_fit(rows, rows[:, 0])
+    with pytest.raises(ValueError, match="loss tukey is not for streams|have changed"):
+        stream.set_params(loss="tukey").partial_fit(rows, rows[:, 0])
+    with pytest.raises(ValueError, match="parameters have changed since the first partial_fit"):
+        stream.set_params(loss="squared", max_leaves=3).partial_fit(rows, rows[:, 0])
+    stream.set_params(max_leaves=None, validity="crisp").partial_fit(rows, rows[:, 0])
+
+
+def test_signs_of_nothing_are_no_trend():
+    for signs in ({}, {"a": 0}, [0, 0]):
+        distributed.start(["a", "b"], "y", estimator=LocalLinearTreeRegressor(monotonic_cst=signs))
+
+
 def test_folds_that_are_dealt_are_not_contiguous_too():
     X, y = table()
     halves = [(np.arange(120, 240), np.arange(120)), (np.arange(120), np.arange(120, 240))]

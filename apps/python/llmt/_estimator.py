@@ -191,9 +191,9 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         for name, levels in zip(names_of(table), table.levels, strict=True):
             if levels:
                 raise ValueError(f'column "{name}" has words; partial_fit learns from numbers')
+        self._refuse_others("is not for streams")
+        options = self._options()
         if stream is None:
-            self._refuse_others("is not for streams")
-            options = self._options()
             self._remember_columns(table)
             self._is_flat = outputs.ndim == 1
             self.n_outputs_ = 1 if outputs.ndim == 1 else outputs.shape[1]
@@ -201,6 +201,8 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
             self._outputs = names or target_names(self.n_outputs_)
             self._levels = table.levels
             stream = self._stream = StreamModel(self.n_features_in_, self.n_outputs_, options)
+        elif stream.options and {**options, "validity": ""} != {**stream.options, "validity": ""}:
+            raise ValueError("parameters have changed since the first partial_fit; a clone of the estimator begins anew")
         outputs = outputs.reshape(len(outputs), -1)
         if outputs.shape[1] != self.n_outputs_:
             raise ValueError(f"y has {outputs.shape[1]} targets, the rows before had {self.n_outputs_}")
@@ -272,7 +274,8 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         """
         options = {"integer_codes"} | {field["parameter"] for field in _core.fit_fields()}
         for name, given in self.get_params(deep=False).items():
-            is_empty = given is False or (hasattr(given, "__len__") and len(given) == 0)
+            is_off = given is None or (isinstance(given, (bool, np.bool_)) and not given)
+            is_empty = is_off or (hasattr(given, "__len__") and len(given) == 0)
             if name not in options and not is_empty:
                 raise ValueError(f"{name} {sentence}")
 
@@ -295,7 +298,11 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
     def _read_monotonic_cst(self, table: Table | None) -> list[str]:
         if self.monotonic_cst is None:
             return []
-        signs = [1] if table is None else _signs(self.monotonic_cst, self._inputs, table)
+        given = self.monotonic_cst
+        if table is not None:
+            signs = _signs(given, self._inputs, table)
+        else:
+            signs = [int(any(given.values() if isinstance(given, Mapping) else given))]
         return [{-1: "falling", 0: "any", 1: "rising"}[sign] for sign in signs]
 
 

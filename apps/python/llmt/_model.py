@@ -114,9 +114,11 @@ class StreamModel:
 
     def __init__(self, inputs: int, outputs: int, options: dict[str, Any]) -> None:
         self.handle = _core.Stream(inputs, outputs, options)
+        self.options = options
 
-    def __getstate__(self) -> dict[str, str]:
-        return {"text": self.handle.to_json()}
+    def __getstate__(self) -> dict[str, Any]:
+        return {"text": self.handle.to_json(), "options": self.options}
 
-    def __setstate__(self, state: dict[str, str]) -> None:
+    def __setstate__(self, state: dict[str, Any]) -> None:
         self.handle = _core.Stream.from_json(state["text"])
+        self.options = state.get("options", {})

@@ -320,11 +320,14 @@ Section poses_section(const CalibrationRun& run) {
 
 }  // namespace
 
+std::string subject_of(const CalibrationRun& run, const std::string& table) {
+  return fmt::format("{}: {} of {}", table, counts_of(run.measurements), run.nominal.chain.name);
+}
+
 Document calibration_document(const CalibrationRun& run) {
   Document document{
       .title = fmt::format("llmt-robot calibrate {} {}", file_name(run.task.robot_file), file_name(run.task.data_file)),
-      .subject = fmt::format("{}: {} of {}", run.task.face.table(run.task.data_file), counts_of(run.measurements),
-                             run.nominal.chain.name),
+      .subject = subject_of(run, run.task.face.table(run.task.data_file)),
       .answer = verdict(run)};
   document.notes = notes_of(run);
   if (!run.input_mistakes.empty()) {

@@ -11,4 +11,7 @@ namespace llmt::report {
 /// calibration is implausible.
 Document calibration_document(const CalibrationRun& run);
 
+/// The first line of it: "table.csv: 120 positions of arm". `table`: how the table is called.
+std::string subject_of(const CalibrationRun& run, const std::string& table);
+
 }  // namespace llmt::report

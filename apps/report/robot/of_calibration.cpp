@@ -90,6 +90,7 @@ Document calibration_page(const CalibrationRun& of) {
     per_pose.emplace_back(model.name, errors);
   }
   Document document = calibration_document(of);
+  document.subject = subject_of(of, file_name(of.task.face.table(of.task.data_file)));
   document.main = shares_below("Share of the poses with an error below", "position error, mm", samples);
   document.main->caption = fmt::format(
       "The further to the left, the better. {}",

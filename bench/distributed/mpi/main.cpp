@@ -40,7 +40,7 @@ int run_program(int argc, char** argv) {
     MpiProcesses processes{std::chrono::duration<double>(patience)};
     arrow_fit_command(app, arguments, processes);
   });
-  return run(app, argc, argv);
+  return run(app, argc, argv, setting_names());
 }
 
 }  // namespace
@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
   const int code = run_program(argc, argv);
   // The others may wait for this one.
-  if (code == exit_refused) MPI_Abort(MPI_COMM_WORLD, code);
+  if (code != exit_done) MPI_Abort(MPI_COMM_WORLD, code);
   MPI_Finalize();
   return code;
 }

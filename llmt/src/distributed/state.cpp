@@ -110,7 +110,7 @@ void check_option(Eigen::Index value, Eigen::Index last) { require(value >= 0 &&
 void check_state(const StateData& data) {
   const KeptOptions& options = data.options;
   require(options.sample_rows > 0 && options.branch_rows >= options.sample_rows && options.block_rows > 0, "an option");
-  branch_options(options, 0);
+  require(branch_options(options, 0).folds.count >= 0, "an option");
   check_option(options.weighted, 1);
   check_option(options.may_have_codes, 1);
   const Eigen::Index inputs = data.inputs();

@@ -283,20 +283,17 @@ def check(
         Probability that something is said to have moved although nothing has.
     """
     arm = _robot_of(robot)
-    try:
-        made = _extension().check(
-            arm._bound,
-            _checked(source_of(measured, "measured"), columns, arm),
-            _reading(columns, False, decimal_comma),
-            same_session=bool(same_session),
-            accuracy_mm=None if accuracy_mm is None else number("accuracy_mm", accuracy_mm, _SMALLEST, _LARGEST),
-            level=number("level", level, 1e-6, 0.5),
-            report=None,
-        )
-    except ValueError as error:
-        if "identified" in arm.to_dict():
-            raise
-        raise ValueError(f"{error}; calibrate it first: check(calibrate(arm, measured).robot, new)") from None
+    if "identified" not in arm.to_dict():
+        raise ValueError("the robot was not calibrated; calibrate it first: check(calibrate(arm, measured).robot, new)")
+    made = _extension().check(
+        arm._bound,
+        _checked(source_of(measured, "measured"), columns, arm),
+        _reading(columns, False, decimal_comma),
+        same_session=bool(same_session),
+        accuracy_mm=None if accuracy_mm is None else number("accuracy_mm", accuracy_mm, _SMALLEST, _LARGEST),
+        level=number("level", level, 1e-6, 0.5),
+        report=None,
+    )
     return Check(_warned(made))
 
 
