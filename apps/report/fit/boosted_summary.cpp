@@ -10,7 +10,7 @@ namespace {
 bool is_blend(const BoostSummary& summary) { return summary.variant == "blend"; }
 
 std::string blend_text(const std::string& target, const BoostSummary& summary) {
-  std::string text = fmt::format("{} is a blend, held-out errors in brackets:", target);
+  std::string text = fmt::format("{} is a mean of several, held-out errors in brackets:", target);
   for (const BoostVariant& variant : summary.compared) {
     if (variant.share == 0.0) continue;
     text += fmt::format(" {:.0f} % {} ({}),", 100.0 * variant.share, variant.name, number(variant.rmse));

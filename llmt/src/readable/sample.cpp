@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "llmt/options.hpp"
 #include "partition/local_models.hpp"
 #include "readable/decimal.hpp"
 
