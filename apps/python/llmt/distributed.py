@@ -55,7 +55,7 @@ def start(
         Branches of the tree with at most this number of rows are brought into one memory and fitted there. A table
         that has no more rows becomes the model of `LocalLinearTreeRegressor.fit`, to the byte. No fewer than
         `sample_rows`. In larger tables no number is taken for a code, and only the tree of the sample leaves out
-        inputs.
+        inputs; its folds are random.
     sample_rows : int
         Rows of the sample that the first pass brings into one memory: a first tree is grown from it.
     block_rows : int
