@@ -30,7 +30,7 @@ int run_program(int argc, char** argv) {
   add_arrow_fit_options(app, arguments);
   double patience = 86400.0;
   add_number(
-      app, "--patience", patience, above_zero,
+      app, "--patience", patience, llmt::above_zero,
       "Seconds that a process waits for another before the job ends; the first one also fits branches meanwhile");
   require_forms(app);
   app.callback([&] {
