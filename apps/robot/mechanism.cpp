@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "llmt/files.hpp"
+#include "llmt/limits.hpp"
 #include "llmt/random.hpp"
 #include "llmt/robotics/mechanism/mechanism_calibration.hpp"
 #include "llmt/robotics/mechanism/mechanism_file.hpp"
@@ -262,7 +263,8 @@ void add_mechanism(CLI::App& app) {
   command->add_flag("--solve", arguments->solve,
                     "Only complete the poses: solve the equations for what the table does not have");
   add_count(*command, "--simulate", arguments->simulate, Eigen::Index{1},
-            "Make this number of random poses within the limits instead of reading them", Eigen::Index{1'000'000});
+            "Make this number of random poses within the limits instead of reading them",
+            Eigen::Index{most(Limit::simulated_poses)});
   add_names(*command, "--measure", arguments->measure, "NAME",
             "Coordinates that --simulate and --solve write (default: all)");
   add_names(*command, "--noise", arguments->noise, "NAME=NUMBER",

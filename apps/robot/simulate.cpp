@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "llmt/files.hpp"
+#include "llmt/limits.hpp"
 #include "llmt/robotics/correction.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "report/robot/arm_tables.hpp"
@@ -15,7 +16,7 @@
 namespace llmt::apps {
 namespace {
 
-constexpr Eigen::Index most_poses = 1'000'000;
+constexpr Eigen::Index most_poses = most(Limit::simulated_poses);
 
 struct SimulateArguments {
   std::string robot;

@@ -17,6 +17,7 @@
 
 #include "llmt/csv.hpp"
 #include "llmt/files.hpp"
+#include "llmt/limits.hpp"
 #include "shared/child_process.hpp"
 #include "shared/help.hpp"
 #include "shared/manual.hpp"
@@ -97,7 +98,7 @@ std::size_t bytes_of_order(std::string_view text, std::size_t i) {
 
 // The middle of a long text left out, not within a character of UTF-8.
 std::string shortened(const std::string& text) {
-  constexpr std::size_t most = 2000;
+  constexpr std::size_t most = llmt::most(Limit::message_bytes);
   if (text.size() <= most) return text;
   const auto continues = [&](std::size_t i) { return (text[i] & 0xC0) == 0x80; };
   std::size_t first = most / 2;

@@ -6,6 +6,8 @@
 #include <charconv>
 #include <stdexcept>
 
+#include "llmt/limits.hpp"
+
 namespace llmt::apps {
 namespace {
 
@@ -42,10 +44,9 @@ bool is_same_file(const std::string& one, const std::string& other) {
 
 // Where a file lies or will lie: its folder and the links at the end of its path are followed.
 std::filesystem::path place_of(const std::string& path) {
-  constexpr int most_links = 40;
   std::error_code unknown;
   std::filesystem::path place = path;
-  for (int links = 0; links < most_links && std::filesystem::is_symlink(place, unknown); ++links) {
+  for (int links = 0; links < most(Limit::symbolic_links) && std::filesystem::is_symlink(place, unknown); ++links) {
     place = place.parent_path() / std::filesystem::read_symlink(place, unknown);
   }
   return std::filesystem::weakly_canonical(std::filesystem::absolute(place, unknown), unknown);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "llmt/files.hpp"
+#include "llmt/limits.hpp"
 #include "shared/cli.hpp"
 
 namespace llmt::apps {
@@ -47,11 +48,10 @@ bool begins_like_json(std::string_view text) {
 
 // Standard input as far as half of the memory, as a file. Errors of reading name it.
 std::string read_standard_input() {
-  constexpr std::uintmax_t longest_line = 16 << 20;
   const std::uintmax_t memory = static_cast<std::uintmax_t>(::sysconf(_SC_PHYS_PAGES)) * ::sysconf(_SC_PAGESIZE);
   const std::string path = "/dev/stdin";
   try {
-    return read_file(path, {.bytes = memory / 2, .line_bytes = longest_line});
+    return read_file(path, {.bytes = memory / 2, .line_bytes = most(Limit::table_line)});
   } catch (const std::runtime_error& error) {
     const std::string message = error.what();
     throw std::runtime_error(message.starts_with(path) ? standard_input + message.substr(path.size()) : message);

@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "llmt/limits.hpp"
+
 namespace llmt {
 
 /// A number of each row. Trees split on it, and leaves take it as a regressor. It is a standardised input
@@ -21,7 +23,7 @@ struct BoostedFeature {
 /// The largest number of slopes in a leaf of a tree that boosting grew.
 inline constexpr int most_boosted_slopes = 8;
 /// The largest number of slopes in a leaf of any tree. The time of contributions of inputs may double with each.
-inline constexpr int most_leaf_slopes = 12;
+inline constexpr int most_leaf_slopes = most(Limit::sum_leaf_slopes);
 
 /// f = constant + sum of slopes . features, held to [low, high].
 struct BoostedLeaf {

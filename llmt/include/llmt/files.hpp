@@ -11,6 +11,8 @@
 #include <string>
 #include <string_view>
 
+#include "llmt/limits.hpp"
+
 namespace llmt {
 
 /// How much read_file() takes. What never ends (a pipe, /dev/zero) is refused there, before memory ends.
@@ -20,10 +22,10 @@ struct FileLimit {
 };
 
 /// The limit for a file that people write, such as a robot description, a catalogue or terms: 16 MiB.
-inline constexpr FileLimit description_limit{.bytes = std::uintmax_t{1} << 24};
+inline constexpr FileLimit description_limit{.bytes = most(Limit::description_bytes)};
 
 /// The limit for a model: 256 MiB. A leaf of 1000 inputs takes 13 MB.
-inline constexpr FileLimit model_limit{.bytes = std::uintmax_t{1} << 28};
+inline constexpr FileLimit model_limit{.bytes = most(Limit::model_bytes)};
 
 /// The bytes of a file. Throws std::runtime_error `path: cannot be read: reason`, also beyond the limit.
 std::string read_file(const std::string& path, const FileLimit& limit = {});

@@ -20,6 +20,7 @@
 #include "llmt/fit_result.hpp"
 #include "llmt/folds.hpp"
 #include "llmt/intervals.hpp"
+#include "llmt/limits.hpp"
 #include "llmt/model.hpp"
 #include "llmt/names.hpp"
 #include "llmt/option_fields.hpp"

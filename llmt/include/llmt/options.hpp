@@ -13,18 +13,19 @@
 
 #include "llmt/abi.hpp"
 #include "llmt/folds.hpp"
+#include "llmt/limits.hpp"
 #include "llmt/names.hpp"
 
 namespace llmt {
 
 /// Inputs and outputs beyond this magnitude are refused, so that squares stay finite; weights of a stream too.
-inline constexpr double largest_magnitude = 1e150;
+inline constexpr double largest_magnitude = bound(Limit::magnitude);
 /// With quadratic local models: squares of products of inputs stay finite.
-inline constexpr double largest_factor = 1e70;
+inline constexpr double largest_factor = bound(Limit::quadratic_magnitude);
 /// A column whose largest magnitude is below this, and not 0, is refused, so that squares do not vanish.
 inline constexpr double smallest_magnitude = 1e-140;
 /// A categorical input may have this many categories.
-inline constexpr int most_categories = 10000;
+inline constexpr int most_categories = most(Limit::categories);
 
 /// How a tree is grown. docs/algorithms.md has a page for each rule. A leaf is split into two children by a threshold
 /// on one input, or by a plane. RSS: residual sum of squares of the local models.

@@ -14,6 +14,7 @@
 
 #include "base/descriptor.hpp"
 #include "base/staged_file.hpp"
+#include "llmt/limits.hpp"
 
 namespace llmt {
 namespace {
@@ -69,8 +70,7 @@ std::filesystem::path end_of_links(const std::string& path) {
   std::filesystem::path target = path;
   std::error_code error;
   for (int links = 0; std::filesystem::is_symlink(target, error); ++links) {
-    constexpr int most_links = 40;
-    if (links == most_links) fail(path, "written", ELOOP);
+    if (links == most(Limit::symbolic_links)) fail(path, "written", ELOOP);
     const std::filesystem::path next = std::filesystem::read_symlink(target, error);
     if (error) fail(path, "written", error.message());
     target = target.parent_path() / next;

@@ -8,11 +8,12 @@
 #include <string_view>
 
 #include "llmt/decimal_mark.hpp"
+#include "llmt/limits.hpp"
 
 namespace llmt::csv {
 
 /// A record that is longer is refused, in files and in pieces: an input without a line break must end before memory.
-inline constexpr std::size_t longest_record = 16 << 20;
+inline constexpr std::size_t longest_record = most(Limit::table_line);
 
 /// Where the header begins: behind blank lines and a byte-order mark, in any order. The size of the text if there is
 /// nothing else.

@@ -12,12 +12,13 @@
 
 #include "base/sums.hpp"
 #include "llmt/distributed.hpp"
+#include "llmt/limits.hpp"
 #include "numerics/gram.hpp"
 
 namespace llmt::distributed {
 
 /// Categories of an input: as many as bins of a number may be.
-inline constexpr std::size_t most_levels = 255;
+inline constexpr std::size_t most_levels = most(Limit::categories_beyond_memory);
 
 /// The joint equations of the sample's tree have at most so many unknowns: 8 MB.
 inline constexpr Eigen::Index most_unknowns = 1000;

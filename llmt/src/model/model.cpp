@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
+#include "llmt/limits.hpp"
 #include "model/model_checks.hpp"
 #include "partition/evaluator.hpp"
 
@@ -13,10 +15,6 @@ namespace llmt {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-
-// Levels and sides that the boxes of all leaves may list: some 400 MB. In a chain of oblique splits the leaves have as
-// many sides as the square of their number.
-constexpr std::size_t most_listed = 100'000'000;
 
 // Cuts the box of a node in two: `box` becomes that of the left child, and that of the right one is returned.
 Leaf cut(const Node& node, int index, Leaf& box) {
@@ -101,7 +99,7 @@ std::vector<Leaf> Model::leaves(Eigen::Index partition) const {
       right.node = node.right;
       box.node = node.left;
       count += listed(right);
-      if (count > most_listed) {
+      if (std::cmp_greater(count, most(Limit::listed_sides))) {
         throw std::runtime_error(
             fmt::format("llmt::Model::leaves: the boxes of partition {} are too many to be listed", partition));
       }

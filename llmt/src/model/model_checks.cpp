@@ -9,13 +9,10 @@
 #include <set>
 #include <string_view>
 
+#include "llmt/limits.hpp"
+
 namespace llmt {
 namespace {
-
-constexpr int most_levels = 10'000;  // of an input, as of a table: most_categories
-
-// Explaining a prediction and writing rules cost time in proportion to leaves times levels.
-constexpr int most_splits_above = 2000;
 
 // Every node, that each but the root has one parent, and how deep they lie.
 void check_tree(const Partition& partition, Eigen::Index index, const std::vector<InputColumn>& inputs,
@@ -30,9 +27,9 @@ void check_tree(const Partition& partition, Eigen::Index index, const std::vecto
       for (const int child : {node.left, node.right}) {  // which come after their parent
         has_parent[child] = true;
         splits_above[child] = splits_above[i] + 1;
-        if (splits_above[child] > most_splits_above) {
+        if (splits_above[child] > most(Limit::model_splits_above_leaf)) {
           throw ModelFault({"partition", index, child},
-                           fmt::format("the tree is deeper than {} splits", most_splits_above));
+                           fmt::format("the tree is deeper than {} splits", most(Limit::model_splits_above_leaf)));
         }
       }
     }
@@ -107,9 +104,9 @@ void check_columns_of_model(const std::vector<InputColumn>& inputs, const std::v
       throw ModelFault({"input", i}, fmt::format("\"{}\": low {}, centre {} and high {} must be finite and low <= high",
                                                  input.name, input.low, input.centre, input.high));
     }
-    if (std::ssize(input.levels) > most_levels) {
+    if (std::ssize(input.levels) > most(Limit::categories)) {
       throw ModelFault({"input", i}, fmt::format("\"{}\": {} levels, at most {} are possible", input.name,
-                                                 input.levels.size(), most_levels));
+                                                 input.levels.size(), most(Limit::categories)));
     }
     const std::vector<double>& codes = input.codes;
     const bool ascend = std::ranges::is_sorted(codes, std::less_equal<>()) && std::ranges::all_of(codes, is_finite);

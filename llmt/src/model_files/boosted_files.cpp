@@ -3,6 +3,7 @@
 #include "boosted/model/boosted_checks.hpp"
 #include "llmt/boosted_model.hpp"
 #include "llmt/files.hpp"
+#include "llmt/limits.hpp"
 #include "model_files/model_json.hpp"
 
 namespace llmt {
@@ -148,7 +149,7 @@ std::string to_json(const BoostedModel& model) {
 }
 
 BoostedModel boosted_from_json(const std::string& text, const std::string& name) {
-  const JsonDocument document = parse_json(text, name, most_model_values);
+  const JsonDocument document = parse_json(text, name, most(Limit::model_values));
   const JsonReader root(document.value(), name);
   check_boosted_format(root);
   std::vector<InputColumn> inputs;

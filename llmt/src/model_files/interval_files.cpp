@@ -5,6 +5,7 @@
 
 #include "llmt/files.hpp"
 #include "llmt/intervals.hpp"
+#include "llmt/limits.hpp"
 #include "model/interval_checks.hpp"
 #include "model_files/model_json.hpp"
 
@@ -71,7 +72,7 @@ std::string to_json(const Model& model, const Intervals& intervals) {
 }
 
 ModelWithIntervals from_json_with_intervals(const std::string& text, const std::string& name) {
-  const JsonDocument document = parse_json(text, name, most_model_values);
+  const JsonDocument document = parse_json(text, name, most(Limit::model_values));
   const Json& json = document.value();
   const JsonReader root(json, name);
   Model model = model_from(root);

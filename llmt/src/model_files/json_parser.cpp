@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "llmt/limits.hpp"
+
 namespace llmt {
 namespace {
 
@@ -61,7 +63,8 @@ class Builder final : public nlohmann::json_sax<Json> {
     const Json& object = *open_.back().container;
     open_.back().key = std::move(key);
     if (object.contains(open_.back().key)) fail("the member stands there twice");
-    if (object.size() >= most_json_members) fail(fmt::format("an object has more than {} members", most_json_members));
+    if (std::ssize(object) >= most(Limit::json_members))
+      fail(fmt::format("an object has more than {} members", most(Limit::json_members)));
     return true;
   }
 
@@ -97,7 +100,8 @@ class Builder final : public nlohmann::json_sax<Json> {
   }
 
   bool open(Json container) {
-    if (open_.size() >= most_json_levels) fail(fmt::format("more than {} levels", most_json_levels));
+    if (std::ssize(open_) >= most(Limit::json_levels))
+      fail(fmt::format("more than {} levels", most(Limit::json_levels)));
     open_.push_back({&add(std::move(container)), {}});
     return true;
   }

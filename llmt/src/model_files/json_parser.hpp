@@ -11,14 +11,6 @@ namespace llmt {
 
 using Json = nlohmann::ordered_json;
 
-/// What a JSON text may have. Model files have less than 12 levels and less than 15 members.
-inline constexpr std::size_t most_json_levels = 32;
-inline constexpr std::size_t most_json_members = 100;  ///< of one object
-
-/// The values in a model file, containers counted. A value takes up to 64 bytes, as an empty text does, however short
-/// it is in the file.
-inline constexpr std::size_t most_model_values = std::size_t{1} << 24;
-
 /// A value whose end takes no memory. nlohmann's destructor takes as much as the longest array and ends the program
 /// where that is not there, as when a file has just proved too large for the memory.
 class JsonDocument {
@@ -36,9 +28,9 @@ class JsonDocument {
 };
 
 /// Parses a text. Throws std::runtime_error that begins with `name` and the JSON pointer to the place, for what is not
-/// JSON, nests deeper than most_json_levels, has an object with more members than most_json_members or one member
-/// twice, a number beyond the range of a double, or more than `most_values` values. No value of the result is nested
-/// deeper than most_json_levels, so that functions that call themselves for every level are safe.
+/// JSON, nests deeper than Limit::json_levels, has an object with more than Limit::json_members or one member twice, a
+/// number beyond the range of a double, or more than `most_values` values. No value of the result is nested deeper than
+/// Limit::json_levels, so that functions that call themselves for every level are safe.
 JsonDocument parse_json(const std::string& text, const std::string& name,
                         std::size_t most_values = std::numeric_limits<std::size_t>::max());
 

@@ -23,7 +23,7 @@ inline constexpr int boosted_format_version = 1;
 Json json_of(const Model& model);
 
 /// The text of a value, as model files have it. Throws std::runtime_error if a name is not valid UTF-8, and if it would
-/// be refused where it is read: beyond most_model_values or model_limit.
+/// be refused where it is read: beyond Limit::model_values or Limit::model_bytes.
 std::string model_text(const Json& json);
 
 /// The same on one line, for a sum of trees, of which nobody reads the file.

@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "llmt/files.hpp"
+#include "llmt/limits.hpp"
 #include "llmt/model.hpp"
 #include "model/codes.hpp"
 #include "model/model_checks.hpp"
@@ -195,7 +196,7 @@ Model model_from(const JsonReader& root) {
 }
 
 Model from_json(const std::string& text, const std::string& name) {
-  const JsonDocument json = parse_json(text, name, most_model_values);
+  const JsonDocument json = parse_json(text, name, most(Limit::model_values));
   return model_from({json.value(), name});
 }
 

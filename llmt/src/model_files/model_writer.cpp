@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "llmt/files.hpp"
+#include "llmt/limits.hpp"
 #include "llmt/model.hpp"
 #include "model/codes.hpp"
 #include "model_files/model_json.hpp"
@@ -117,22 +118,22 @@ int version_of(const Model& model) {
 }
 
 // Containers counted, as parse_json() does. No model is deep.
-std::size_t values_in(const Json& json) {
-  std::size_t count = 1;
+std::int64_t values_in(const Json& json) {
+  std::int64_t count = 1;
   for (const Json& value : json) count += json.is_structured() ? values_in(value) : 0;
   return count;
 }
 
-[[noreturn]] void refuse_size(std::size_t size, const char* what) {
+[[noreturn]] void refuse_size(std::int64_t size, const char* what) {
   throw std::runtime_error(fmt::format(
       "llmt::to_json: the model has {} {}; at most {} MiB and {} values are read. Fewer leaves or inputs, or a model "
       "without intervals, take less",
-      size, what, model_limit.bytes >> 20, most_model_values));
+      size, what, model_limit.bytes >> 20, most(Limit::model_values)));
 }
 
 // `indent`: of a line, as nlohmann's dump() takes it; -1: one line.
 std::string text_of(const Json& json, int indent) {
-  if (const std::size_t values = values_in(json); values > most_model_values) refuse_size(values, "values");
+  if (const std::int64_t values = values_in(json); values > most(Limit::model_values)) refuse_size(values, "values");
   std::string text;
   try {
     text = json.dump(indent) + "\n";

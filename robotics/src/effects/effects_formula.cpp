@@ -7,9 +7,12 @@
 
 #include "effects/effect_entries.hpp"
 #include "expressions/expression.hpp"
+#include "llmt/limits.hpp"
 
 namespace llmt::robotics {
 namespace {
+
+static_assert(Expression::longest == most(Limit::expression_characters));  // that header includes no library
 
 // The number in "q3" or "tau3", or 0 if the name is of another kind.
 std::size_t joint_number(const std::string& name, const std::string& prefix) {

@@ -8,6 +8,7 @@
 
 #include "kinematics/checks.hpp"
 #include "kinematics/mimics.hpp"
+#include "llmt/limits.hpp"
 #include "llmt/robotics/chain.hpp"
 
 namespace llmt::robotics {
@@ -88,8 +89,9 @@ void validate(const Chain& chain) {
     refuse("payload", fmt::format("payload mass_kg is {}, must be >= 0", chain.payload.mass_kg));
   }
   if (chain.joints.empty()) refuse("joints", "there are no joints");
-  if (chain.joints.size() > most_joints) {
-    refuse("joints", fmt::format("there are {} joints, at most {} are possible", chain.joints.size(), most_joints));
+  if (std::ssize(chain.joints) > most(Limit::robot_joints)) {
+    refuse("joints",
+           fmt::format("there are {} joints, at most {} are possible", chain.joints.size(), most(Limit::robot_joints)));
   }
   std::set<std::string> names = {"base", "tool", "payload"};
   for (const Joint& joint : chain.joints) {

@@ -7,8 +7,6 @@
 
 namespace llmt::robotics {
 
-inline constexpr std::size_t most_joints = 100;
-
 /// A field that holds what it may not. `field` is the key under which description files have it, so that a reader can
 /// name its line.
 class FieldError : public std::invalid_argument {

@@ -6,16 +6,12 @@
 #include <stdexcept>
 
 #include "llmt/files.hpp"
+#include "llmt/limits.hpp"
 #include "yaml/yaml_reader.hpp"
 #include "yaml/yaml_writer.hpp"
 
 namespace llmt::robotics {
 namespace {
-
-constexpr std::size_t most_parameters = 1000;
-constexpr std::size_t most_coordinates = 100;  // joints, and outputs
-constexpr std::size_t most_definitions = 1000;
-constexpr std::size_t most_equations = 200;
 
 // "value_mm": a quantity with its unit; "value" alone has the unit 1.
 std::string key_of(const std::string& quantity, const std::string& unit) {
@@ -81,27 +77,27 @@ Mechanism read_document(YamlMap& map) {
   Mechanism mechanism;
   mechanism.name = map.text("mechanism");
   if (map.has("parameters")) {
-    for (YamlMap& entry : map.maps("parameters", most_parameters))
+    for (YamlMap& entry : map.maps("parameters", most(Limit::mechanism_parameters)))
       mechanism.parameters.push_back(read_parameter(entry));
   }
   for (const char* kind : {"joints", "outputs"}) {
     if (!map.has(kind)) continue;
-    for (YamlMap& entry : map.maps(kind, most_coordinates)) {
+    for (YamlMap& entry : map.maps(kind, most(Limit::mechanism_coordinates))) {
       mechanism.coordinates.push_back(read_coordinate(entry, std::string(kind) == "outputs"));
     }
   }
   if (map.has("definitions")) {
     YamlMap definitions = map.map("definitions");
     const std::vector<std::string> names = definitions.keys();
-    if (names.size() > most_definitions) {
-      map.refuse("definitions",
-                 fmt::format("there are {} definitions, at most {} are possible", names.size(), most_definitions));
+    if (std::ssize(names) > most(Limit::mechanism_parameters)) {
+      map.refuse("definitions", fmt::format("there are {} definitions, at most {} are possible", names.size(),
+                                            most(Limit::mechanism_parameters)));
     }
     for (const std::string& name : names) {
       mechanism.definitions.push_back({.name = name, .text = definitions.text(name)});
     }
   }
-  mechanism.equations = map.texts("equations", most_equations);
+  mechanism.equations = map.texts("equations", most(Limit::mechanism_equations));
   map.finish({"mechanism", "parameters", "joints", "outputs", "definitions", "equations"});
   return mechanism;
 }

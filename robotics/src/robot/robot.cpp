@@ -7,7 +7,9 @@
 #include <numeric>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
+#include "llmt/limits.hpp"
 #include "robot/checks.hpp"
 #include "robot/robot_evaluator.hpp"
 #include "robot/settings.hpp"
@@ -63,10 +65,11 @@ void validate(const Robot& robot) {
     }
     values += effect.values.size();
   }
-  if (robot.effects.size() > most_effects || values > most_effect_values) {
+  if (std::ssize(robot.effects) > most(Limit::robot_effects) ||
+      std::cmp_greater(values, most(Limit::robot_effect_values))) {
     throw std::invalid_argument(
         fmt::format("llmt::robotics::Robot: {} effects with {} values, at most {} with {} are possible",
-                    robot.effects.size(), values, most_effects, most_effect_values));
+                    robot.effects.size(), values, most(Limit::robot_effects), most(Limit::robot_effect_values)));
   }
   const std::size_t ranges = robot.calibration ? robot.calibration->joint_ranges.size() : 0;
   if (ranges != 0 && ranges != robot.chain.joints.size()) {

@@ -12,6 +12,7 @@
 #include "effects/formula_term.hpp"
 #include "kinematics/checks.hpp"
 #include "llmt/files.hpp"
+#include "llmt/limits.hpp"
 #include "robot/checks.hpp"
 #include "yaml/yaml_reader.hpp"
 
@@ -116,7 +117,7 @@ const EffectType& read_effect_type(YamlMap& map) {
 // Each term is checked by itself, so that a mistake is found at its line.
 void read_formula(YamlMap& map, const Chain& chain, Effect& effect) {
   effect.formula.name = map.text("name");
-  for (YamlMap term : map.maps("terms", most_effect_values)) {
+  for (YamlMap term : map.maps("terms", most(Limit::robot_effect_values))) {
     effect.formula.terms.push_back(read_formula_term(term));
     term.finish({"name", "joint", "x", "y", "z", "unit", "scale"});
     const std::string reason = term_refusal(chain, effect, effect.formula.terms.back());
@@ -146,7 +147,7 @@ Effect read_effect(YamlMap map, const Chain& chain) {
   for (const EffectConstant& constant : type.constants) effect.constants.push_back(map.number(key_of(constant)));
   for (const EffectParameter& parameter : type.parameters) {
     if (parameter.list) {
-      effect.values = map.all_numbers(key_of(parameter), most_effect_values);
+      effect.values = map.all_numbers(key_of(parameter), most(Limit::robot_effect_values));
     } else {
       effect.values.push_back(map.number(key_of(parameter)));
     }
@@ -159,16 +160,16 @@ std::vector<Effect> read_effects(YamlMap& map, const Chain& chain) {
   std::vector<Effect> effects;
   std::set<std::string> seen;
   std::size_t values = 0;
-  for (const YamlMap& entry : map.maps("effects", most_effects)) {
+  for (const YamlMap& entry : map.maps("effects", most(Limit::robot_effects))) {
     const Effect& effect = effects.emplace_back(read_effect(entry, chain));
     check_in_file(entry, [&] { validate(chain, effect); });
     if (!seen.insert(effect_label(effect)).second) {
       entry.refuse(fmt::format("effect {} is there twice", effect_label(effect)));
     }
     values += effect.values.size();
-    if (values > most_effect_values) {
-      entry.refuse(
-          fmt::format("the effects have {} values up to here, at most {} are possible", values, most_effect_values));
+    if (values > most(Limit::robot_effect_values)) {
+      entry.refuse(fmt::format("the effects have {} values up to here, at most {} are possible", values,
+                               most(Limit::robot_effect_values)));
     }
   }
   return effects;
@@ -263,7 +264,7 @@ Chain read_chain(YamlMap& map) {
   Chain chain;
   chain.name = map.text("name");
   chain.convention = read_convention(map);
-  for (const YamlMap& joint : map.maps("joints", most_joints)) {
+  for (const YamlMap& joint : map.maps("joints", most(Limit::robot_joints))) {
     chain.joints.push_back(read_joint(joint));
     Chain so_far = chain;
     for (Joint& each : so_far.joints) each.mimic.reset();  // it may mimic a joint that comes later

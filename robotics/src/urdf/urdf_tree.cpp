@@ -14,6 +14,7 @@
 
 #include "kinematics/checks.hpp"
 #include "kinematics/units.hpp"
+#include "llmt/limits.hpp"
 #include "urdf/xml_check.hpp"
 
 namespace llmt::robotics {
@@ -271,9 +272,9 @@ UrdfArm urdf_arm(const std::string& text, const std::string& name, const UrdfLin
   const std::string tip = links.tip.empty() ? the_tip(*model, base, name) : links.tip;
   const std::vector<urdf::JointSharedPtr> joints = joints_between(*model, base, link_named(*model, tip, name));
   const auto moving = std::ranges::count_if(joints, [](const auto& joint) { return !is_fixed(*joint); });
-  if (moving > static_cast<std::ptrdiff_t>(most_joints)) {
+  if (moving > most(Limit::robot_joints)) {
     throw std::runtime_error(
-        fmt::format("{}: there are {} joints, at most {} are possible", name, moving, most_joints));
+        fmt::format("{}: there are {} joints, at most {} are possible", name, moving, most(Limit::robot_joints)));
   }
   std::set<const urdf::Joint*> of_arm;
   for (const urdf::JointSharedPtr& joint : joints) of_arm.insert(joint.get());

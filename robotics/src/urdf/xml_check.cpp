@@ -7,13 +7,10 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "llmt/limits.hpp"
+
 namespace llmt::robotics {
 namespace {
-
-constexpr int most_levels = 100;
-constexpr int most_nodes = 300'000;
-constexpr int most_links = 5000;  // of a chain: urdfdom destroys the links one within the other
-constexpr int most_attributes = 100;
 
 // Counts what expat meets. Nothing is thrown through expat: the first reason stops it.
 struct Census {
@@ -29,7 +26,8 @@ struct Census {
     XML_StopParser(parser, XML_FALSE);
   }
   void count() {
-    if (++nodes > most_nodes) stop(fmt::format("there are more than {} elements and comments", most_nodes));
+    if (++nodes > most(Limit::urdf_nodes))
+      stop(fmt::format("there are more than {} elements and comments", most(Limit::urdf_nodes)));
   }
 };
 
@@ -38,10 +36,14 @@ Census& of(void* data) { return *static_cast<Census*>(data); }
 void begin_element(void* data, const XML_Char* name, const XML_Char** attributes) {
   Census& census = of(data);
   census.count();
-  if (++census.depth > most_levels) census.stop(fmt::format("elements are nested deeper than {}", most_levels));
+  if (++census.depth > most(Limit::urdf_levels))
+    census.stop(fmt::format("elements are nested deeper than {}", most(Limit::urdf_levels)));
   constexpr int level_of_links = 2;
   const bool is_link = census.depth == level_of_links && std::string_view(name) == "link";
-  if (is_link && ++census.links > most_links) census.stop(fmt::format("there are more than {} links", most_links));
+  if (is_link && ++census.links > most(Limit::urdf_links)) {  // urdfdom destroys links of a chain within each other
+    census.stop(fmt::format("there are more than {} links", most(Limit::urdf_links)));
+  }
+  constexpr std::int64_t most_attributes = most(Limit::urdf_attributes);
   int texts = 0;  // name, value, name, value, ..., null
   while (texts <= 2 * most_attributes && attributes[texts] != nullptr) ++texts;
   if (texts > 2 * most_attributes) census.stop(fmt::format("an element has more than {} attributes", most_attributes));

@@ -10,12 +10,10 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "llmt/limits.hpp"
+
 namespace llmt::robotics {
 namespace {
-
-constexpr std::size_t most_bytes = 16 << 20;
-constexpr int most_nodes = 300000;
-constexpr std::size_t longest_text = 10000;
 
 // The part of a file's text that a message shows.
 std::string shown(const std::string& text) {
@@ -55,8 +53,8 @@ class Counter : public YAML::EventHandler {
   int nodes_ = 0;
 
   void count(const YAML::Mark& mark) {
-    if (++nodes_ > most_nodes) {
-      throw YAML::ParserException(mark, fmt::format("more than {} keys, values and lists", most_nodes));
+    if (++nodes_ > most(Limit::yaml_nodes)) {
+      throw YAML::ParserException(mark, fmt::format("more than {} keys, values and lists", most(Limit::yaml_nodes)));
     }
   }
 };
@@ -64,8 +62,9 @@ class Counter : public YAML::EventHandler {
 }  // namespace
 
 YAML::Node parse_yaml(const std::string& text, const std::string& file) {
-  if (text.size() > most_bytes) {
-    throw std::runtime_error(fmt::format("{}: {} bytes, at most {} are read", file, text.size(), most_bytes));
+  if (std::ssize(text) > most(Limit::description_bytes)) {
+    throw std::runtime_error(
+        fmt::format("{}: {} bytes, at most {} are read", file, text.size(), most(Limit::description_bytes)));
   }
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
     throw std::runtime_error(fmt::format("{}: this is UTF-16, UTF-8 is needed", file));
@@ -124,9 +123,9 @@ YAML::Node YamlMap::at(const std::string& key) {
 std::string YamlMap::text(const std::string& key) {
   const YAML::Node value = at(key);
   if (!value.IsScalar()) refuse_at(value, fmt::format("\"{}\" must be a word", key));
-  if (value.Scalar().size() > longest_text) {
-    refuse_at(value,
-              fmt::format("\"{}\" has {} characters, at most {} are read", key, value.Scalar().size(), longest_text));
+  if (std::ssize(value.Scalar()) > most(Limit::expression_characters)) {
+    refuse_at(value, fmt::format("\"{}\" has {} characters, at most {} are read", key, value.Scalar().size(),
+                                 most(Limit::expression_characters)));
   }
   return value.Scalar();
 }
@@ -173,8 +172,9 @@ std::vector<std::string> YamlMap::texts(const std::string& key, std::size_t most
   std::vector<std::string> result;
   for (const YAML::Node& entry : value) {
     if (!entry.IsScalar()) refuse_at(entry, fmt::format("\"{}\" must be a list of texts", key));
-    if (entry.Scalar().size() > longest_text) {
-      refuse_at(entry, fmt::format("{} characters, at most {} are read", entry.Scalar().size(), longest_text));
+    if (std::ssize(entry.Scalar()) > llmt::most(Limit::expression_characters)) {
+      refuse_at(entry, fmt::format("{} characters, at most {} are read", entry.Scalar().size(),
+                                   llmt::most(Limit::expression_characters)));
     }
     result.push_back(entry.Scalar());
   }
