@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -61,17 +62,25 @@ std::vector<std::string> levels(std::int64_t count) {
   return names;
 }
 
-// A chain of splits on its first input, whose every box lists the levels of ten further inputs.
+// A chain whose first splits take a level of each of ten inputs away. The boxes of all later leaves list the others.
+constexpr int num_categorical = 10;
+constexpr int others = 9999;
+constexpr int of_a_box = num_categorical * others;
+constexpr int of_first_boxes = num_categorical + others * num_categorical * (num_categorical - 1) / 2;
+
 void list_boxes(std::int64_t sides) {
-  constexpr int inputs = 10;
-  constexpr int of_input = 1000;
-  const llmt::Model chain =
-      oracle::chain(static_cast<int>(sides / (inputs * of_input)) + 1, llmt::ValidityKind::crisp, 0.0);
+  const auto splits = static_cast<int>((sides - of_first_boxes) / of_a_box) + num_categorical;
+  const llmt::Model chain = oracle::chain(splits + 1, llmt::ValidityKind::crisp, 0.0);
   std::vector<llmt::InputColumn> columns = chain.inputs();
-  for (int k = 0; k < inputs; ++k) {
-    columns.push_back({.name = std::to_string(k), .low = 0.0, .high = of_input - 1.0, .levels = levels(of_input)});
+  llmt::Partition partition = chain.partitions().front();
+  for (int k = 0; k < num_categorical; ++k) {
+    columns.push_back({.name = std::to_string(k), .low = 0.0, .high = others, .levels = levels(others + 1)});
+    llmt::Node& node = partition.nodes[std::max(0, 2 * k - 1)];
+    node.split_input = 2 + k;
+    node.level_side.assign(others + 1, -1);
+    node.level_side.back() = 1;
   }
-  llmt::Model(columns, chain.outputs(), chain.regressors(), chain.partitions()).leaves(0);
+  llmt::Model(columns, chain.outputs(), chain.regressors(), {partition}).leaves(0);
 }
 
 void sum_with_slopes(std::int64_t slopes) {
@@ -282,7 +291,7 @@ std::string refusal(Limit limit) {
     case Limit::robot_effects:
       return "1001";
     case Limit::robot_effect_values:
-      return "10001 values, at most 1000 with 10000 are possible";
+      return "have 10001 values up to here, at most 10000 are possible";
     case Limit::urdf_levels:
       return "nested deeper than 100";
     case Limit::urdf_attributes:
@@ -292,7 +301,7 @@ std::string refusal(Limit limit) {
     case Limit::urdf_links:
       return "more than 5000 links";
     case Limit::simulated_poses:
-      return "it must be from 1 to 1000000";
+      return "it must be a whole number from 1 to 1000000";
     case Limit::symbolic_links:
       return "Too many levels of symbolic links";
     case Limit::message_bytes:
@@ -317,7 +326,7 @@ TEST_P(EachLimit, IsTakenAndOneMoreIsRefused) {
   const double beyond = row.unit == llmt::LimitUnit::power
                             ? std::nextafter(row.most, std::numeric_limits<double>::infinity())
                             : row.most + 1.0;
-  const double smallest_step = row.limit == Limit::listed_sides ? 1e4 : 0.0;
+  const double smallest_step = row.limit == Limit::listed_sides ? of_a_box : 0.0;
   EXPECT_EQ(message(row.limit, row.most).find(refusal(row.limit)), std::string::npos) << message(row.limit, row.most);
   const std::string refused = message(row.limit, beyond + smallest_step);
   EXPECT_NE(refused.find(refusal(row.limit)), std::string::npos) << refused.substr(0, 300);
@@ -328,7 +337,7 @@ INSTANTIATE_TEST_SUITE_P(Limits, EachLimit, testing::ValuesIn(llmt::limit_table)
 
 std::string amount(const llmt::LimitRow& row) {
   if (row.unit == llmt::LimitUnit::bytes) return fmt::format("{} MiB", row.most / (1 << 20));
-  if (row.unit == llmt::LimitUnit::power) return fmt::format("{:g}", row.most);
+  if (row.unit == llmt::LimitUnit::power) return fmt::format("1e{:g}", std::log10(row.most));
   std::string digits = fmt::format("{}", row.most);
   for (std::ptrdiff_t at = std::ssize(digits) - 3; at > 0 && digits.size() > 4; at -= 3) digits.insert(at, " ");
   return digits;

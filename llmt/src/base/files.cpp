@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -48,11 +49,12 @@ class Meter {
   void add(std::string_view piece) {
     bytes_ += piece.size();
     if (bytes_ > limit_.bytes) fail_size();
-    const std::size_t last_break = piece.rfind('\n');
-    line_bytes_ = last_break == std::string_view::npos ? line_bytes_ + piece.size() : piece.size() - last_break - 1;
-    if (line_bytes_ > limit_.line_bytes) {
+    // Pieces are far shorter than a line may be: only the line that began before the piece may be too long.
+    if (line_bytes_ + std::min(piece.find('\n'), piece.size()) > limit_.line_bytes) {
       fail(path_, "read", fmt::format("no line ends within {}", size_text(limit_.line_bytes)));
     }
+    const std::size_t last_break = piece.rfind('\n');
+    line_bytes_ = last_break == std::string_view::npos ? line_bytes_ + piece.size() : piece.size() - last_break - 1;
   }
   [[noreturn]] void fail_size() const {
     fail(path_, "read", fmt::format("it holds more than {}, the most that is read", size_text(limit_.bytes)));
