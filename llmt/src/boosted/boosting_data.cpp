@@ -15,6 +15,7 @@
 #include "base/count.hpp"
 #include "boosted/model/boosted_checks.hpp"
 #include "boosted/packed_sums.hpp"
+#include "data/column_order.hpp"
 #include "data/equal_rows.hpp"
 #include "data/given_rows.hpp"
 #include "llmt/random.hpp"
@@ -119,8 +120,9 @@ void shuffle(DifferentRows& rows, std::vector<int>& parts, std::uint64_t seed) {
 // The column of an input, and the deviation that its values are divided by.
 std::pair<InputColumn, double> describe(const TrainingData& data, const GivenRows& given, const BoostingData& result,
                                         Eigen::Index input) {
+  const int place = result.columns[input];
   InputColumn column;
-  column.name = data.input_names.empty() ? fmt::format("x{}", input + 1) : data.input_names[input];
+  column.name = data.input_names.empty() ? fmt::format("x{}", place + 1) : data.input_names[place];
   const auto visit_values = [&](const auto& visit) {
     for (Eigen::Index i = 0; i < result.x.rows(); ++i) {
       if (!std::isnan(result.x(i, input))) visit(result.x(i, input), result.rows.weights(i));
@@ -141,7 +143,7 @@ std::pair<InputColumn, double> describe(const TrainingData& data, const GivenRow
   column.high = high;
   if (weight == 0.0) return {column, 1.0};
   column.centre = std::clamp(sum / weight, low, high);
-  if (std::ranges::count(given.categorical, input) > 0) {
+  if (std::ranges::count(given.categorical, place) > 0) {
     const auto levels = static_cast<int>(high) + 1;
     if (levels > most_boosted_levels) {
       throw std::invalid_argument(
@@ -150,8 +152,8 @@ std::pair<InputColumn, double> describe(const TrainingData& data, const GivenRow
                       column.name, levels, most_boosted_levels));
     }
     for (int level = 0; level < levels; ++level) {
-      const bool has_name = !data.levels.empty() && !data.levels[input].empty();
-      column.levels.push_back(has_name ? data.levels[input][level] : fmt::format("{}", level));
+      const bool has_name = !data.levels.empty() && !data.levels[place].empty();
+      column.levels.push_back(has_name ? data.levels[place][level] : fmt::format("{}", level));
     }
     return {column, 1.0};
   }
@@ -223,6 +225,8 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
   }
   if (result.regime.searched < no_limit) shuffle(different, result.parts, options.seed);
   result.x = given.inputs.values(different.first, Eigen::all);
+  result.columns = column_order(result.x);
+  result.x = given.inputs.values(different.first, result.columns);
   result.y = given.outputs.values(different.first, Eigen::all);
   result.rows.weights = Eigen::Map<const Eigen::VectorXd>(different.weights.data(), count);
   if (given.weights.size() > 0 && !given.are_counts) result.rows.weights /= result.rows.weights.mean();

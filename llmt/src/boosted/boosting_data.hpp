@@ -17,7 +17,9 @@ struct HoldOut {
   std::vector<int> held_out;
 };
 
+/// The inputs stand in an order that does not depend on where the caller has them: column_order().
 struct BoostingData {
+  std::vector<int> columns;  ///< of the caller, for each input
   std::vector<InputColumn> inputs;
   std::vector<OutputColumn> outputs;
   std::vector<double> deviations;

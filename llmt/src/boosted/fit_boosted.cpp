@@ -132,6 +132,23 @@ BoostedSum fit_output(const BoostingData& data, Eigen::Index output, const Boost
   return sum;
 }
 
+// The model with its inputs where the caller has them.
+BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
+  std::vector<InputColumn> inputs(data.inputs.size());
+  std::vector<double> deviations(data.inputs.size());
+  for (std::size_t j = 0; j < data.inputs.size(); ++j) {
+    inputs[data.columns[j]] = data.inputs[j];
+    deviations[data.columns[j]] = data.deviations[j];
+  }
+  for (BoostedSum& sum : sums) {
+    for (BoostedFeature& feature : sum.features) {
+      feature.first = data.columns[feature.first];
+      if (feature.second >= 0) feature.second = data.columns[feature.second];
+    }
+  }
+  return {std::move(inputs), data.outputs, std::move(deviations), std::move(sums)};
+}
+
 }  // namespace
 
 BoostResult fit_boosted(const TrainingData& data, const BoostOptions& options, const Progress& progress) {
@@ -143,7 +160,7 @@ BoostResult fit_boosted(const TrainingData& data, const BoostOptions& options, c
     Work part(work, work.left() / static_cast<double>(rows.y.cols() - output));
     sums.push_back(fit_output(rows, output, options, summaries.emplace_back(), part));
   }
-  BoostResult result{BoostedModel(rows.inputs, rows.outputs, rows.deviations, std::move(sums)), std::move(summaries)};
+  BoostResult result{model_of(rows, std::move(sums)), std::move(summaries)};
   work.finish();
   return result;
 }

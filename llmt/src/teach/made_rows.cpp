@@ -6,6 +6,7 @@
 
 #include "base/matrix.hpp"
 #include "base/parallel.hpp"
+#include "data/column_order.hpp"
 #include "llmt/random.hpp"
 
 namespace llmt {
@@ -97,12 +98,13 @@ MadeRows make_rows(const Eigen::MatrixXd& inputs, const std::vector<int>& catego
   parallel_for(std::ssize(different), max_threads, [&](Eigen::Index k) {
     near[different[k]] = near_rows(distances, different[k], among, options.neighbours);
   });
+  const std::vector<int> columns = column_order(inputs);
   Random random(options.seed);
   for (std::size_t k = 0; k < made.made_of.size(); ++k) {
     const std::vector<int>& others = near[made.made_of[k]];
     if (others.empty()) continue;
     const int other = others[random.below(others.size())];
-    for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
+    for (const int j : columns) {
       if (random.uniform() < options.swapped) made.inputs(static_cast<Eigen::Index>(k), j) = inputs(other, j);
     }
   }

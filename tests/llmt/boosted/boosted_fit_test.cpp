@@ -310,7 +310,8 @@ TEST(BoostedFile, SaysWhereItIsWrong) {
   expect_fault(changed("/inputs/1/name", "a"), "/inputs/1: its name is there twice");
   expect_fault(changed("/sums/0/rate", 2.0), "/sums/0: rate is not in (0, 1]");
   expect_fault(changed("/sums/0/features/0/column", 6), "/sums/0/features/0: the first input is no numeric input");
-  expect_fault(changed("/sums/0/features/0/plus_column", 0), "the second input is no other numeric input");
+  expect_fault(changed("/sums/0/features/0/plus_column", good["sums"][0]["features"][0]["column"]),
+               "the second input is no other numeric input");
   expect_fault(changed("/sums/0/trees/0/splits/0/0", 99), "/sums/0/trees/0/splits/0: there is no feature 99");
   expect_fault(changed("/sums/0/trees/0/splits/0/4", 0), "/sums/0/trees/0/splits/0: 0 is no child");
   expect_fault(changed("/sums/0/trees/0/splits/0/4", -2000000000), "is no child");
