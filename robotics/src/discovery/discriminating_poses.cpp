@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "kinematics/units.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 #include "llmt/random.hpp"
 #include "llmt/robotics/simulation.hpp"
 
@@ -50,9 +51,10 @@ Predictions predict(const ExplanationPair& question, const Poses& poses) {
   const std::vector<Eigen::Index> adjusted = fitted_columns(question.without);
   const Eigen::Index own = std::ssize(question.found.values);
   const Eigen::Index rivals = signatures.cols() - own;
-  Predictions predictions{.columns = Eigen::MatrixXd(jacobian.rows(), std::ssize(adjusted) + rivals), .found = {}};
-  predictions.columns << jacobian(Eigen::all, adjusted), signatures.leftCols(rivals);
-  predictions.found = signatures.rightCols(own) * Eigen::Map<const Eigen::VectorXd>(question.found.values.data(), own);
+  Predictions predictions;
+  predictions.columns = side_by_side(columns_of(jacobian, adjusted), signatures.leftCols(rivals));
+  const Eigen::VectorXd values = Eigen::VectorXd::Map(question.found.values.data(), own);
+  predictions.found = product(signatures.rightCols(own), values);
   for (Eigen::Index row = 0; row < predictions.found.size(); ++row) {
     if (question.measured_axes[row % 3]) continue;
     predictions.columns.row(row).setZero();
@@ -67,8 +69,8 @@ struct Normal {
   Eigen::VectorXd right;
 
   void add(const Eigen::MatrixXd& columns, const Eigen::VectorXd& found) {
-    matrix += columns.transpose() * columns;
-    right += columns.transpose() * found;
+    matrix += gram(columns);
+    right += transposed_product(columns, found);
   }
 };
 
@@ -184,9 +186,9 @@ Eigen::VectorXd disagreements(const Normal& normal, const Predictions& candidate
   constexpr double ridge = 1e-10;
   Eigen::MatrixXd matrix = normal.matrix;
   matrix.diagonal().array() += ridge;
-  const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
+  const Cholesky factor(matrix);
   const Eigen::VectorXd misses = candidates.found - candidates.columns * factor.solve(normal.right);
-  const Eigen::MatrixXd whitened = factor.matrixL().solve(candidates.columns.transpose());
+  const Eigen::MatrixXd whitened = factor.whitened(candidates.columns);
   Eigen::VectorXd result(candidates.found.size() / 3);
   for (Eigen::Index i = 0; i < result.size(); ++i) {
     const auto own = whitened.middleCols(3 * i, 3);
@@ -223,8 +225,9 @@ Discrimination discriminating_poses(const Robot& fitted, std::size_t effect, con
   const Eigen::VectorXd squares = normal.matrix.diagonal() + candidates.columns.colwise().squaredNorm().transpose();
   const Eigen::VectorXd scale =
       squares.unaryExpr([](double square) { return square > 0.0 ? 1.0 / std::sqrt(square) : 0.0; });
-  candidates.columns *= scale.asDiagonal();
-  normal.matrix = scale.asDiagonal() * normal.matrix * scale.asDiagonal();
+  scale_columns(candidates.columns, scale);
+  scale_rows(normal.matrix, scale);
+  scale_columns(normal.matrix, scale);
   normal.right = scale.cwiseProduct(normal.right);
 
   // Exact data: below this share of the effect itself the first order is not to be trusted.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linear_algebra/linear_algebra.hpp"
 #include "llmt/explain.hpp"
 
 namespace llmt::robotics {
@@ -95,11 +96,11 @@ void add_dependences(const Inputs& inputs, const Eigen::MatrixXd& residuals, Gap
     if (!residuals.col(axis).isZero(0.0)) axes.push_back(axis);
   }
   if (axes.empty()) return;
-  const Eigen::MatrixXd outputs = residuals(Eigen::all, axes);
+  const Eigen::MatrixXd outputs = columns_of(residuals, axes);
   const Model model = fit(inputs.values, outputs, tree_options(outputs.rows())).model;
   const Eigen::MatrixXd shares = importance(model, inputs.values);
   const Eigen::VectorXd energy = outputs.colwise().squaredNorm().transpose() / outputs.squaredNorm();
-  const Eigen::VectorXd weights = shares.transpose() * energy;
+  const Eigen::VectorXd weights = transposed_product(shares, energy);
   for (std::size_t c = 0; c < inputs.names.size(); ++c) {
     const double share = weights(c);
     if (share > 0.02) map.depends_on.push_back({inputs.names[c], share});
@@ -140,7 +141,7 @@ GapMap gap_map(const Robot& robot, const Measurements& searched) {
   add_levers(robot, searched, world, map);
   if (searched.count() < fewest) return map;
   const Inputs inputs = inputs_of(searched, robot.chain);
-  add_regions(inputs, world.rowwise().norm(), map);
+  add_regions(inputs, row_norms(world), map);
   add_dependences(inputs, world, map);
   return map;
 }

@@ -4,11 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "discovery/investigation/pose_split.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 #include "llmt/robotics/calibration_quality.hpp"
 
 namespace llmt::robotics {
@@ -48,11 +48,11 @@ double left_by_compliance(Robot robot, const Calibration& baseline, const Measur
   robot.chain.gravity_m_s2 = gravity;
   std::vector<Effect> soft;
   for (const Joint& joint : robot.chain.joints) soft.push_back({"joint_compliance", joint.name, {0.0}});
-  const Eigen::MatrixXd geometry = position_jacobian(baseline.robot, measurements.poses, free)(rows, Eigen::all);
-  Eigen::MatrixXd columns(errors.size(), geometry.cols() + std::ssize(soft));
-  columns << geometry, effect_signatures(robot, soft, measurements.poses)(rows, Eigen::all);
-  for (Eigen::Index k = 0; k < columns.cols(); ++k) columns.col(k) /= std::max(columns.col(k).norm(), 1e-300);
-  const Eigen::VectorXd values = columns.colPivHouseholderQr().solve(errors);
+  Eigen::MatrixXd columns = rows_of(side_by_side(position_jacobian(baseline.robot, measurements.poses, free),
+                                                 effect_signatures(robot, soft, measurements.poses)),
+                                    rows);
+  normalize_columns(columns);
+  const Eigen::VectorXd values = least_squares(columns, errors);
   return (errors - columns * values).squaredNorm();
 }
 

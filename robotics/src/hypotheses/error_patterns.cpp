@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "kinematics/units.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -39,7 +40,8 @@ Eigen::MatrixXd cosines(const Eigen::VectorXd& x, Eigen::Index count) {
   const double low = x.minCoeff();
   const double range = std::max(1e-300, x.maxCoeff() - low);
   for (Eigen::Index m = 0; m < count; ++m) {
-    functions.col(m) = (std::numbers::pi * static_cast<double>(m + 1) / range * (x.array() - low)).cos();
+    const double order = std::numbers::pi * static_cast<double>(m + 1) / range;
+    for (Eigen::Index i = 0; i < x.size(); ++i) functions(i, m) = std::cos(order * (x(i) - low));
   }
   return functions;
 }
@@ -132,9 +134,12 @@ Eigen::MatrixXd pair_waves(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   Eigen::MatrixXd functions(a.size(), 12);
   Eigen::Index next = 0;
   for (const auto& [u, v] : {std::pair{1, 1}, {1, -1}, {2, 1}, {2, -1}, {1, 2}, {1, -2}}) {
-    const Eigen::ArrayXd phase = (u * a + v * b).array();
-    functions.col(next++) = phase.cos();
-    functions.col(next++) = phase.sin();
+    for (Eigen::Index i = 0; i < a.size(); ++i) {
+      const double phase = u * a(i) + v * b(i);
+      functions(i, next) = std::cos(phase);
+      functions(i, next + 1) = std::sin(phase);
+    }
+    next += 2;
   }
   return functions;
 }
@@ -149,16 +154,16 @@ void add_pairs(const Scene& scene, std::vector<Hypothesis>& patterns) {
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const JointSignal signal = joint_signal(scene, j);
     const auto n = std::ssize(signal.rows);
-    const Eigen::Map<const Eigen::VectorXd> along(signal.along.data(), n);
-    const Eigen::Map<const Eigen::VectorXd> weight(signal.weight.data(), n);
+    const Eigen::VectorXd along = Eigen::VectorXd::Map(signal.along.data(), n);
+    const Eigen::VectorXd weight = Eigen::VectorXd::Map(signal.weight.data(), n);
     for (std::size_t a = 0; a < joints.size(); ++a) {
       for (std::size_t b = a + 1; b < joints.size(); ++b) {
         const Eigen::MatrixXd waves =
             pair_waves(scene.poses.joints(signal.rows, a), scene.poses.joints(signal.rows, b));
-        Eigen::MatrixXd gram = waves.transpose() * weight.asDiagonal() * waves;
+        Eigen::MatrixXd gram = weighted_gram(waves, weight);
         gram.diagonal().array() *= 1.0 + 1e-6;
-        const Eigen::VectorXd moment = waves.transpose() * along;
-        pairs.push_back({a, b, j, moment.dot(gram.ldlt().solve(moment))});
+        const Eigen::VectorXd moment = transposed_product(waves, along);
+        pairs.push_back({a, b, j, moment.dot(solve_symmetric(gram, moment))});
       }
     }
   }

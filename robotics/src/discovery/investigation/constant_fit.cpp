@@ -1,11 +1,11 @@
 #include "discovery/investigation/constant_fit.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "discovery/investigation/pose_split.hpp"
 #include "discovery/investigation/unsound_effects.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -35,7 +35,7 @@ Augmented augmented(const Calibration& fitted, const Measurements& kept, const s
   const std::vector<Eigen::Index> rows = measured_rows(kept);
   fit.errors = stacked(kept.positions_mm, rows) - stacked(positions(fitted.robot, kept.poses), rows);
   fit.columns.resize(fit.errors.size(), std::ssize(fit.free) + std::ssize(open));
-  fit.columns.leftCols(std::ssize(fit.free)) = position_jacobian(fitted.robot, kept.poses, fit.free)(rows, Eigen::all);
+  fit.columns.leftCols(std::ssize(fit.free)) = rows_of(position_jacobian(fitted.robot, kept.poses, fit.free), rows);
   for (std::size_t e = 0; e < open.size(); ++e) {
     constexpr double share = 1e-4;
     Robot moved = fitted.robot;
@@ -48,15 +48,15 @@ Augmented augmented(const Calibration& fitted, const Measurements& kept, const s
     fit.columns.col(std::ssize(fit.free) + static_cast<Eigen::Index>(e)) =
         (above - stacked(positions(moved, kept.poses), rows)) / (2.0 * step);
   }
-  fit.norms = fit.columns.colwise().norm().transpose().cwiseMax(1e-300);
-  fit.columns *= fit.norms.cwiseInverse().asDiagonal();
+  fit.norms = column_norms(fit.columns).cwiseMax(1e-300);
+  scale_columns(fit.columns, fit.norms.cwiseInverse());
   return fit;
 }
 
 // A step of all free parameters and of the open constants. `largest` becomes the largest relative step of a constant.
 Robot stepped(const Robot& robot, const Augmented& fit, const std::vector<std::size_t>& open, double& largest) {
   const Eigen::Index free = std::ssize(fit.free);
-  const Eigen::VectorXd all = fit.columns.colPivHouseholderQr().solve(fit.errors).cwiseQuotient(fit.norms);
+  const Eigen::VectorXd all = least_squares(fit.columns, fit.errors).cwiseQuotient(fit.norms);
   Robot moved = robot;
   Eigen::VectorXd errors = fit.errors;
   for (std::size_t e = 0; e < open.size(); ++e) {
@@ -69,8 +69,7 @@ Robot stepped(const Robot& robot, const Augmented& fit, const std::vector<std::s
     largest = std::max(largest, std::abs(step) / constant);
     constant += step;
   }
-  const Eigen::VectorXd steps =
-      fit.columns.leftCols(free).colPivHouseholderQr().solve(errors).cwiseQuotient(fit.norms.head(free));
+  const Eigen::VectorXd steps = least_squares(fit.columns.leftCols(free), errors).cwiseQuotient(fit.norms.head(free));
   const std::vector<discovery::Parameter> known = parameters(robot);
   Eigen::VectorXd values(std::ssize(known));
   for (std::size_t k = 0; k < known.size(); ++k) values(static_cast<Eigen::Index>(k)) = known[k].value;
@@ -146,8 +145,7 @@ std::map<std::string, double> fit_constants(Investigation& investigation, const 
   const Augmented fit = augmented(investigation.fitted, kept, open);
   const double dof = static_cast<double>(fit.errors.size() - fit.columns.cols());
   const double variance = fit.errors.squaredNorm() / std::max(1.0, dof);
-  const Eigen::MatrixXd inverse =
-      (fit.columns.transpose() * fit.columns).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = pseudo_inverse(gram(fit.columns));
   const Eigen::VectorXd all = (variance * inverse.diagonal()).cwiseMax(0.0).cwiseSqrt().cwiseQuotient(fit.norms);
   Calibration& fitted = investigation.fitted;
   std::map<std::string, double> errors;

@@ -1,7 +1,5 @@
 #include "discovery/investigation/joint_maps.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -11,6 +9,7 @@
 #include "discovery/investigation/leave_one_out.hpp"
 #include "effects/effect_entries.hpp"
 #include "kinematics/units.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
@@ -81,14 +80,13 @@ class Smoother {
     double log_prior = 0.0;
     Eigen::MatrixXd all = penalty(log_smoothness);
     for (const Knots& own : knots_) {
-      log_prior += log_determinant(all.block(own.begin, own.begin, own.count, own.count));
+      log_prior += Cholesky(all.block(own.begin, own.begin, own.count, own.count)).log_determinant();
     }
     all += gram_;
-    const Eigen::LLT<Eigen::MatrixXd> factor(all);
-    if (factor.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+    const Cholesky factor(all);
+    if (!factor.exists()) return std::numeric_limits<double>::infinity();
     const double left = squares_ - moments_.dot(factor.solve(moments_));
-    return 2.0 * factor.matrixLLT().diagonal().array().log().sum() - log_prior +
-           freedom_ * std::log(std::max(left, 1e-12 * squares_));
+    return factor.log_determinant() - log_prior + freedom_ * std::log(std::max(left, 1e-12 * squares_));
   }
 
   // One smoothness for all, then each on its own.
@@ -131,10 +129,6 @@ class Smoother {
   std::vector<Knots> knots_;
   double information_ = 1.0;
   std::vector<Eigen::MatrixXd> penalties_;
-
-  static double log_determinant(const Eigen::MatrixXd& matrix) {
-    return 2.0 * Eigen::LLT<Eigen::MatrixXd>(matrix).matrixLLT().diagonal().array().log().sum();
-  }
 };
 
 // The residuals and the hats at the measured coordinates, projected on the orthogonal complement of the range of
@@ -171,24 +165,17 @@ ProjectedMaps project(const Robot& robot, const Measurements& measurements, cons
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
   const auto n = std::ssize(rows);
   ProjectedMaps projected;
-  Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses, freed_parameters(robot))(rows, Eigen::all);
+  Eigen::MatrixXd jacobian = rows_of(position_jacobian(robot, measurements.poses, freed_parameters(robot)), rows);
   const Eigen::MatrixXd model = positions(robot, measurements.poses);
   projected.residuals.resize(n);
   for (Eigen::Index k = 0; k < n; ++k) {
     projected.residuals(k) = measurements.positions_mm(rows[k] / 3, rows[k] % 3) - model(rows[k] / 3, rows[k] % 3);
   }
-  for (Eigen::Index c = 0; c < jacobian.cols(); ++c) {
-    if (jacobian.col(c).norm() > 0.0) jacobian.col(c).normalize();
-  }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(jacobian);
-  factors.setThreshold(1e-9);
-  Eigen::MatrixXd& baseline = projected.baseline;
-  baseline = Eigen::MatrixXd::Identity(n, factors.rank());
-  baseline.applyOnTheLeft(factors.householderQ());
-  projected.residuals -= baseline * (baseline.transpose() * projected.residuals);
+  normalize_columns(jacobian);
+  projected.baseline = orthonormal_range(jacobian);
+  remove_range(projected.baseline, projected.residuals);
   projected.hats = pushed_hats(robot, measurements.poses, knots, rows);
-  const Eigen::MatrixXd inside = baseline.transpose() * projected.hats;
-  projected.hats.noalias() -= baseline * inside;
+  remove_range(projected.baseline, projected.hats);
   return projected;
 }
 
@@ -202,16 +189,16 @@ Eigen::VectorXd beyond_maps(const Robot& robot, const Measurements& measurements
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
   std::vector<Eigen::Index> geometry = freed_parameters(robot);
   std::erase_if(geometry, [&](Eigen::Index k) { return k >= geometric_parameter_count(robot.chain); });
-  const Eigen::MatrixXd basis = range_of(position_jacobian(robot, measurements.poses, geometry)(rows, Eigen::all));
+  const Eigen::MatrixXd basis = range_of(rows_of(position_jacobian(robot, measurements.poses, geometry), rows));
   Eigen::MatrixXd hats = pushed_hats(robot, measurements.poses, knots, rows);
-  const Eigen::MatrixXd inside = basis.transpose() * hats;
-  hats.noalias() -= basis * inside;
+  remove_range(basis, hats);
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(hats.cols(), hats.cols());
   gram.selfadjointView<Eigen::Lower>().rankUpdate(hats.transpose());
   gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
   const Smoother smoother(gram, Eigen::VectorXd::Zero(gram.cols()), 0.0, 0.0, knots);
-  const Eigen::LLT<Eigen::MatrixXd> factor(gram + smoother.penalty(maps.smoothness));
-  const Eigen::MatrixXd left = displacements - hats * factor.solve(hats.transpose() * displacements);
+  const Cholesky factor(gram + smoother.penalty(maps.smoothness));
+  Eigen::MatrixXd left = displacements;
+  subtract_product(hats, factor.solve(transposed_product(hats, displacements)), left);
   for (Eigen::Index k = 0; k < shares.size(); ++k) {
     const double all = displacements.col(k).squaredNorm();
     if (all > 0.0) shares(k) = left.col(k).squaredNorm() / all;
@@ -229,11 +216,11 @@ std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& 
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(unknowns, unknowns);
   gram.selfadjointView<Eigen::Lower>().rankUpdate(hats.transpose());
   gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
-  const Eigen::VectorXd moments = hats.transpose() * residuals;
+  const Eigen::VectorXd moments = transposed_product(hats, residuals);
   const Smoother smoother(gram, moments, residuals.squaredNorm(), static_cast<double>(n - baseline.cols()), knots);
   JointMaps maps;
   maps.smoothness = smoother.choose();
-  const Eigen::LLT<Eigen::MatrixXd> factor(gram + smoother.penalty(maps.smoothness));
+  const Cholesky factor(gram + smoother.penalty(maps.smoothness));
   const Eigen::VectorXd values = factor.solve(moments);
   for (const Knots& own : knots) {
     const Eigen::VectorXd part = values.segment(own.begin, own.count);
@@ -244,7 +231,7 @@ std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& 
   maps.before = leave_one_out_distances(geometry, residuals, d);
   Eigen::MatrixXd used(geometry.rows() + unknowns, n);
   used.topRows(geometry.rows()) = geometry;
-  used.bottomRows(unknowns) = factor.matrixL().solve(hats.transpose());
+  used.bottomRows(unknowns) = factor.whitened(hats);
   maps.after = leave_one_out_distances(used, residuals - hats * values, d);
   const PairedDifference gain = paired_difference(maps.before, maps.after);
   maps.gain_in_errors = gain.standard_error > 0.0 ? gain.mean / gain.standard_error : 0.0;

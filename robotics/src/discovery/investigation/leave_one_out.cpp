@@ -1,22 +1,20 @@
 #include "discovery/investigation/leave_one_out.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 
 #include "calibration/free_parameters.hpp"
 #include "discovery/investigation/jacobian_range.hpp"
 #include "discovery/investigation/pose_split.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 
 namespace llmt::robotics {
 
 Eigen::VectorXd leave_one_out_distances(const Eigen::MatrixXd& used, const Eigen::VectorXd& errors, Eigen::Index d) {
   Eigen::VectorXd lengths(errors.size() / d);
   for (Eigen::Index i = 0; i < lengths.size(); ++i) {
-    const auto columns = used.middleCols(i * d, d);
-    Eigen::MatrixXd own = Eigen::MatrixXd::Identity(d, d);
-    own.noalias() -= columns.transpose() * columns;
+    Eigen::MatrixXd own = identity_minus_gram(used.middleCols(i * d, d));
     own.diagonal().array() += 1e-6;
-    lengths(i) = own.ldlt().solve(errors.segment(i * d, d)).norm();
+    lengths(i) = solve_symmetric(own, errors.segment(i * d, d)).norm();
   }
   return lengths;
 }
@@ -26,7 +24,7 @@ Eigen::VectorXd leave_one_out_distances(const Calibration& fitted, const Measure
   const Measurements kept = without_rows(measurements, skipped);
   const std::vector<Eigen::Index> free = freed_parameters(fitted.robot);
   const std::vector<Eigen::Index> rows = measured_rows(kept);
-  const Eigen::MatrixXd basis = range_of(position_jacobian(fitted.robot, kept.poses, free)(rows, Eigen::all));
+  const Eigen::MatrixXd basis = range_of(rows_of(position_jacobian(fitted.robot, kept.poses, free), rows));
   const Eigen::MatrixXd model = positions(fitted.robot, kept.poses);
   Eigen::VectorXd errors(std::ssize(rows));
   for (Eigen::Index k = 0; k < errors.size(); ++k) {

@@ -1,6 +1,5 @@
 #include "discovery/investigation/question.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 
 #include "calibration/free_parameters.hpp"
@@ -10,6 +9,7 @@
 #include "hypotheses/catalogue_effects.hpp"
 #include "hypotheses/error_patterns.hpp"
 #include "hypotheses/scans.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -44,11 +44,11 @@ std::vector<Eigen::Index> independent_geometry(const Robot& robot, const Poses& 
   if (!unseen_by_touch(robot).empty()) return freed_geometry(robot);
   Robot rigid = robot;
   rigid.effects.clear();
-  Eigen::MatrixXd jacobian = position_jacobian(rigid, poses)(rows, Eigen::all);
+  Eigen::MatrixXd jacobian = rows_of(position_jacobian(rigid, poses), rows);
   // A column that is tiny next to the others is rounding, often with the pattern of a column that moves the tool.
   // Scaled up it would take that column's place.
   constexpr double nothing = 1e-7;
-  const double least = nothing * jacobian.colwise().norm().maxCoeff();
+  const double least = nothing * column_norms(jacobian).maxCoeff();
   for (auto column : jacobian.colwise()) {
     if (column.norm() > least) {
       column.normalize();
@@ -56,12 +56,7 @@ std::vector<Eigen::Index> independent_geometry(const Robot& robot, const Poses& 
       column.setZero();
     }
   }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(jacobian);
-  factors.setThreshold(1e-9);
-  const auto& order = factors.colsPermutation().indices();
-  std::vector<Eigen::Index> columns(order.begin(), order.begin() + factors.rank());
-  std::ranges::sort(columns);
-  return columns;
+  return independent_columns(jacobian);
 }
 
 // An effect that an earlier round added, as a hypothesis with its signature at the present estimates.
@@ -87,9 +82,9 @@ void weigh(const Measurements& measurements, const Eigen::VectorXd& residuals, c
   const Eigen::VectorXd weights = NoiseModel(measurements, options).relative_weights(residuals);
   if (weights.size() == 0) return;
   question.evidence.residuals.array() *= weights.array();
-  question.evidence.jacobian.array().colwise() *= weights.array();
+  scale_rows(question.evidence.jacobian, weights);
   for (Hypothesis& hypothesis : question.hypotheses) {
-    hypothesis.candidate.signature.array().colwise() *= weights.array();
+    scale_rows(hypothesis.candidate.signature, weights);
   }
 }
 
@@ -124,9 +119,10 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
     const Effect& effect = robot.effects[e];
     const Eigen::Index k = std::ssize(effect.values);
     if (e >= own) {
-      const Eigen::Map<const Eigen::VectorXd> values(effect.values.data(), k);
-      explained += jacobian.middleCols(column, k) * values;
-      result.hypotheses.push_back(found_before(found[e - own], effect, jacobian.middleCols(column, k)));
+      const Eigen::MatrixXd signature = jacobian.middleCols(column, k);
+      const Eigen::VectorXd values = Eigen::VectorXd::Map(effect.values.data(), k);
+      explained += product(signature, values);
+      result.hypotheses.push_back(found_before(found[e - own], effect, signature));
     } else {
       baseline += k;
     }
@@ -135,8 +131,8 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
   if (options.patterns) {
     for (Hypothesis& pattern : pattern_hypotheses(scene)) result.hypotheses.push_back(std::move(pattern));
   }
-  result.evidence.residuals = explained(rows);
-  result.evidence.jacobian = jacobian.leftCols(baseline)(rows, Eigen::all);
+  result.evidence.residuals = entries_of(explained, rows);
+  result.evidence.jacobian = rows_of(jacobian.leftCols(baseline), rows);
   result.evidence.components = std::ranges::count(measurements.measured, true);
   result.evidence.repeats = repeats_of(measurements.poses);
   // Deflections are at most a hundredth of the levers, and the error of first order is a fraction of that, here
@@ -144,9 +140,9 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
   constexpr double first_order = 1e-5;
   result.evidence.resolution = first_order;
   for (Hypothesis& hypothesis : result.hypotheses) {
-    hypothesis.candidate.signature = Eigen::MatrixXd(hypothesis.candidate.signature(rows, Eigen::all));
+    hypothesis.candidate.signature = rows_of(hypothesis.candidate.signature, rows);
   }
-  weigh(measurements, residuals(rows), options.calibration, result);
+  weigh(measurements, entries_of(residuals, rows), options.calibration, result);
   return result;
 }
 

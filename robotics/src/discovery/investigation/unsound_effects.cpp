@@ -6,6 +6,7 @@
 #include "calibration/free_parameters.hpp"
 #include "discovery/investigation/jacobian_range.hpp"
 #include "discovery/investigation/pose_split.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -57,12 +58,12 @@ double total_distance(const Robot& robot, const Measurements& measurements) {
 Eigen::VectorXd beyond_geometry(const Robot& robot, const Effect& effect, const Measurements& measurements) {
   const Robot without = without_effect(robot, effect);
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
-  const Eigen::VectorXd moved =
-      stacked(positions(robot, measurements.poses) - positions(without, measurements.poses), rows);
+  Eigen::VectorXd moved = stacked(positions(robot, measurements.poses) - positions(without, measurements.poses), rows);
   std::vector<Eigen::Index> geometry = freed_parameters(robot);
   std::erase_if(geometry, [&](Eigen::Index k) { return k >= geometric_parameter_count(robot.chain); });
-  const Eigen::MatrixXd basis = range_of(position_jacobian(without, measurements.poses, geometry)(rows, Eigen::all));
-  return moved - basis * (basis.transpose() * moved);
+  const Eigen::MatrixXd basis = range_of(rows_of(position_jacobian(without, measurements.poses, geometry), rows));
+  remove_range(basis, moved);
+  return moved;
 }
 
 std::vector<Effect> unsound(const Calibration& baseline, const Calibration& fitted,

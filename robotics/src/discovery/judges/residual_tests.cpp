@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -12,6 +10,7 @@
 
 #include "calibration/free_parameters.hpp"
 #include "discovery/investigation/pose_split.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 #include "llmt/random.hpp"
 #include "llmt/statistics.hpp"
 
@@ -32,7 +31,7 @@ struct Residuals {
   Eigen::MatrixXd after_fit(const Eigen::MatrixXd& given) const {
     const Eigen::MatrixXd by_sample = given.transpose();
     Eigen::VectorXd stacked = by_sample.reshaped();
-    stacked -= basis * (basis.transpose() * stacked);
+    remove_range(basis, stacked);
     return stacked.reshaped(components(), count()).transpose();
   }
 };
@@ -65,17 +64,12 @@ std::vector<Eigen::Index> axes_of(const Measurements& measurements) {
 Residuals residuals_of(const Calibration& fitted, const Measurements& measurements) {
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
   const std::vector<Eigen::Index> free = freed_parameters(fitted.robot);
-  Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, measurements.poses, free)(rows, Eigen::all);
-  for (auto column : jacobian.colwise()) {
-    if (column.norm() > 0.0) column.normalize();
-  }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(jacobian);
-  factors.setThreshold(1e-9);
+  Eigen::MatrixXd jacobian = rows_of(position_jacobian(fitted.robot, measurements.poses, free), rows);
+  normalize_columns(jacobian);
   Residuals residuals;
-  residuals.basis = Eigen::MatrixXd::Identity(jacobian.rows(), factors.rank());
-  residuals.basis.applyOnTheLeft(factors.householderQ());
+  residuals.basis = orthonormal_range(jacobian);
   const Eigen::MatrixXd model = positions(fitted.robot, measurements.poses);
-  residuals.vectors = (measurements.positions_mm - model)(Eigen::all, axes_of(measurements));
+  residuals.vectors = columns_of(measurements.positions_mm - model, axes_of(measurements));
   return residuals;
 }
 
@@ -127,14 +121,14 @@ Eigen::MatrixXd random_like(const Residuals& residuals, const std::vector<Eigen:
   const Eigen::Index d = residuals.components();
   Eigen::MatrixXd local = residuals.vectors;
   for (std::size_t i = 0; i < axes.size(); ++i) local.row(i) = (axes[i] * local.row(i).transpose()).transpose();
-  Eigen::MatrixXd covariance = local.transpose() * local;
+  Eigen::MatrixXd covariance = gram(local);
   covariance.diagonal().array() += 1e-9 * covariance.trace();
-  const Eigen::MatrixXd root = Eigen::LLT<Eigen::MatrixXd>(covariance).matrixL();
+  const Eigen::MatrixXd root = Cholesky(covariance).lower();
   Eigen::MatrixXd drawn(residuals.count(), d);
   for (Eigen::Index i = 0; i < drawn.rows(); ++i) {
     Eigen::VectorXd normal(d);
     for (double& value : normal) value = random.normal();
-    Eigen::VectorXd vector = (root * normal).normalized() * residuals.vectors.row(i).norm();
+    Eigen::VectorXd vector = product(root, normal).normalized() * residuals.vectors.row(i).norm();
     if (!axes.empty()) vector = axes[i].transpose() * vector;
     drawn.row(i) = vector.transpose();
   }
@@ -230,9 +224,9 @@ std::optional<ResidualStructure> test_neighbours(const Residuals& residuals, con
     const Eigen::MatrixXd p = positions(fitted.robot, measurements.poses);
     const std::array<std::pair<const char*, Eigen::VectorXd>, 3> inputs = {
         {{"azimuth", p.col(1).binaryExpr(p.col(0), [](double y, double x) { return std::atan2(y, x); })},
-         {"elevation", p.col(2).binaryExpr(p.leftCols(2).rowwise().norm().eval(),
-                                           [](double z, double across) { return std::atan2(z, across); })},
-         {"distance", p.rowwise().norm()}}};
+         {"elevation",
+          p.col(2).binaryExpr(row_norms(p.leftCols(2)), [](double z, double across) { return std::atan2(z, across); })},
+         {"distance", row_norms(p)}}};
     for (const auto& [name, input] : inputs) {
       if (!neighbours_are_alike(local, input, random)) continue;
       return ResidualStructure{"instrument",

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "discovery/investigation/pose_split.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -17,29 +17,29 @@ struct Rest {
   Measurements kept;
   std::vector<Eigen::Index> rows;  // coordinates that were measured
   Eigen::VectorXd errors;
-  Eigen::HouseholderQR<Eigen::MatrixXd> fitted;  // of the derivatives by all free parameters
+  RangeRotation to_range;  // of the derivatives by all free parameters
   Eigen::Index rank = 0;
 };
 
 Rest rest_of(const Investigation& investigation) {
   const Calibration& fitted = investigation.fitted;
-  Rest rest{.robot = fitted.robot, .kept = investigation.kept(), .rows = {}, .errors = {}, .fitted = {}, .rank = 0};
+  Rest rest{.robot = fitted.robot, .kept = investigation.kept(), .rows = {}, .errors = {}, .to_range = {}, .rank = 0};
   rest.rows = measured_rows(rest.kept);
   rest.errors = stacked(rest.kept.positions_mm - positions(fitted.robot, rest.kept.poses), rest.rows);
   std::vector<Eigen::Index> free;
   for (std::size_t k = 0; k < fitted.robot.identified.size(); ++k) {
     if (fitted.robot.identified[k].state == "free") free.push_back(static_cast<Eigen::Index>(k));
   }
-  Eigen::MatrixXd columns = position_jacobian(fitted.robot, rest.kept.poses, free)(rest.rows, Eigen::all);
-  for (Eigen::Index k = 0; k < columns.cols(); ++k) columns.col(k) /= std::max(columns.col(k).norm(), 1e-300);
+  Eigen::MatrixXd columns = rows_of(position_jacobian(fitted.robot, rest.kept.poses, free), rest.rows);
+  normalize_columns(columns);
   rest.rank = columns.cols();
-  rest.fitted.compute(columns);
+  rest.to_range = RangeRotation(columns);
   return rest;
 }
 
 // The components orthogonal to the range of the fit.
 Eigen::MatrixXd beyond_fit(const Rest& rest, const Eigen::MatrixXd& columns) {
-  const Eigen::MatrixXd turned = rest.fitted.householderQ().transpose() * columns;
+  const Eigen::MatrixXd turned = rest.to_range(columns);
   return turned.bottomRows(turned.rows() - rest.rank);
 }
 
@@ -58,12 +58,12 @@ Harmonics harmonics_of(const Rest& rest, const Effect& wave) {
     tones.back().constants[0] *= times;
   }
   const Eigen::MatrixXd columns =
-      beyond_fit(rest, effect_signatures(rest.robot, tones, rest.kept.poses)(rest.rows, Eigen::all));
+      beyond_fit(rest, rows_of(effect_signatures(rest.robot, tones, rest.kept.poses), rest.rows));
   const Eigen::VectorXd errors = beyond_fit(rest, rest.errors);
   const Eigen::Index count = columns.cols();
   const Eigen::Index left = errors.size() - count;
   if (left < 2 * count) return {};
-  const Eigen::VectorXd turned = Eigen::HouseholderQR<Eigen::MatrixXd>(columns).householderQ().transpose() * errors;
+  const Eigen::VectorXd turned = RangeRotation(columns)(errors);
   const double energy = turned.head(count).squaredNorm();
   const double variance = turned.tail(left).squaredNorm() / static_cast<double>(left);
   return {energy, energy / static_cast<double>(count) / std::max(variance, 1e-300)};
