@@ -13,6 +13,7 @@
 #include "calibration/joint_ranges.hpp"
 #include "calibration/noise_model.hpp"
 #include "calibration/still_joints.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 #include "llmt/robotics/calibration_problem.hpp"
 
 namespace llmt::robotics {
@@ -161,7 +162,9 @@ CalibrationRecord record_of(const Calibration& calibration, const Measurements& 
   }
   const Eigen::VectorXd errors = calibration.result.standard_errors(known);
   const Eigen::VectorXd inverse = errors.unaryExpr([](double error) { return error > 0.0 ? 1.0 / error : 0.0; });
-  record.correlations = inverse.asDiagonal() * calibration.result.covariance(known, known) * inverse.asDiagonal();
+  record.correlations = rows_of(columns_of(calibration.result.covariance, known), known);
+  scale_rows(record.correlations, inverse);
+  scale_columns(record.correlations, inverse);
   record.correlations = record.correlations.cwiseMin(1.0).cwiseMax(-1.0).eval();
   // Exactly symmetric, as the file has it.
   record.correlations = Eigen::MatrixXd(record.correlations.selfadjointView<Eigen::Lower>());

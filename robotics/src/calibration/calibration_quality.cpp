@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -16,6 +15,7 @@
 #include "calibration/joint_ranges.hpp"
 #include "calibration/noise_model.hpp"
 #include "calibration/singular_values.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 #include "llmt/random.hpp"
 #include "llmt/statistics.hpp"
 
@@ -44,11 +44,11 @@ Weighed weighed(const Calibration& calibration, const Measurements& measurements
                            : measurements.poses.observations[orientation_rows(measurements.poses).front()].lever_mm;
   result.weights =
       NoiseModel(measurements, {}).weights({calibration.noise_mm, 1e-3 * calibration.orientation_noise_mrad * lever});
-  result.jacobian = position_jacobian(calibration.robot, measurements.poses, free)(rows, Eigen::all);
+  result.jacobian = rows_of(position_jacobian(calibration.robot, measurements.poses, free), rows);
   const Eigen::MatrixXd errors =
       (measurements.positions_mm - positions(calibration.robot, measurements.poses)).transpose();
   result.residuals = errors.reshaped()(rows).cwiseProduct(result.weights);
-  result.jacobian = result.weights.asDiagonal() * result.jacobian;
+  scale_rows(result.jacobian, result.weights);
   result.prior = Eigen::VectorXd::Zero(std::ssize(free));
   for (Eigen::Index c = 0; c < std::ssize(free); ++c) {
     const discovery::Parameter& parameter = parameters[free[c]];
@@ -91,12 +91,11 @@ double root_mean_square_of(const Eigen::VectorXd& values) {
 
 Eigen::VectorXd leave_one_out(const Calibration& calibration, const Measurements& measurements) {
   const Weighed fit = weighed(calibration, measurements);
-  Eigen::MatrixXd information = fit.jacobian.transpose() * fit.jacobian;
+  Eigen::MatrixXd information = gram(fit.jacobian);
   information.diagonal() += fit.prior;
   // A direction that nothing determines moves no reading either.
   information.diagonal().array() += 1e-12 * information.diagonal().maxCoeff();
-  const Eigen::LLT<Eigen::MatrixXd> factor(information);
-  const Eigen::MatrixXd whitened = factor.matrixL().solve(fit.jacobian.transpose());
+  const Eigen::MatrixXd whitened = Cholesky(information).whitened(fit.jacobian);
   const std::vector<Eigen::Index> coordinates = measured_rows(measurements);
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(measurements.count());
   std::map<Eigen::Index, std::vector<Eigen::Index>> of_row;
@@ -104,10 +103,9 @@ Eigen::VectorXd leave_one_out(const Calibration& calibration, const Measurements
   for (const std::vector<Eigen::Index>& rows : poses_of(measurements)) {
     std::vector<Eigen::Index> own;
     for (const Eigen::Index row : rows) own.insert(own.end(), of_row[row].begin(), of_row[row].end());
-    const Eigen::MatrixXd columns = whitened(Eigen::all, own);
-    Eigen::MatrixXd left = Eigen::MatrixXd::Identity(std::ssize(own), std::ssize(own)) - columns.transpose() * columns;
+    Eigen::MatrixXd left = identity_minus_gram(columns_of(whitened, own));
     left.diagonal().array() += 1e-9;
-    const Eigen::VectorXd errors = left.ldlt().solve(fit.residuals(own));
+    const Eigen::VectorXd errors = solve_symmetric(left, entries_of(fit.residuals, own));
     for (std::size_t k = 0; k < own.size(); ++k) {
       squares(coordinates[own[k]] / 3) += std::pow(errors(k) / fit.weights(own[k]), 2);
     }
@@ -150,7 +148,7 @@ Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses&
   }
   const Eigen::MatrixXd covariance =
       calibration.result.covariance.unaryExpr([](double value) { return std::isfinite(value) ? value : 0.0; });
-  const Eigen::VectorXd variances = (jacobian * covariance).cwiseProduct(jacobian).rowwise().sum();
+  const Eigen::VectorXd variances = quadratic_forms(jacobian, covariance);
   Eigen::VectorXd deviations(poses.count());
   for (Eigen::Index i = 0; i < poses.count(); ++i) {
     deviations(i) = std::sqrt(std::max(0.0, variances.segment(3 * i, 3).sum()));

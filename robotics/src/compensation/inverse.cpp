@@ -1,6 +1,5 @@
 #include "compensation/inverse.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -8,6 +7,7 @@
 #include <limits>
 
 #include "kinematics/units.hpp"
+#include "linear_algebra/linear_algebra.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -91,16 +91,16 @@ Eigen::VectorXd Inverse::step(const Eigen::MatrixXd& jacobian, const Eigen::Vect
   const double size = jacobian.squaredNorm();
   if (size == 0.0) return back;
   if (jacobian.cols() <= jacobian.rows()) {
-    Eigen::MatrixXd normal = jacobian.transpose() * jacobian;
+    Eigen::MatrixXd normal = gram(jacobian);
     normal.diagonal().array() += std::max(damping, tiny) * size;
-    return normal.ldlt().solve(jacobian.transpose() * error);
+    return solve_symmetric(normal, transposed_product(jacobian, error));
   }
   Eigen::MatrixXd normal = jacobian * jacobian.transpose();
   normal.diagonal().array() += tiny * size;
-  const Eigen::VectorXd free = back - jacobian.transpose() * normal.ldlt().solve(jacobian * back);
+  const Eigen::VectorXd free = back - transposed_product(jacobian, solve_symmetric(normal, product(jacobian, back)));
   normal.diagonal().array() += damping * size;
-  if (damping > 0.0) return jacobian.transpose() * normal.ldlt().solve(error);  // the target comes first
-  return jacobian.transpose() * normal.ldlt().solve(error) + free;
+  const Eigen::VectorXd change = transposed_product(jacobian, solve_symmetric(normal, error));
+  return damping > 0.0 ? change : Eigen::VectorXd(change + free);  // the target comes first
 }
 
 // Joints that would leave their range stay where they are, and the others do the work.
