@@ -1,13 +1,13 @@
 #include "shared/table_files.hpp"
 
 #include <fmt/format.h>
-#include <stdlib.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <filesystem>
+#include <cerrno>
+#include <cstring>
 #include <set>
 #include <stdexcept>
+#include <unordered_set>
 #include <utility>
 
 #include "llmt/files.hpp"
@@ -17,26 +17,13 @@
 namespace llmt::apps {
 namespace {
 
-constexpr Eigen::Index rows_at_once = 65536;
 constexpr std::size_t text_at_once = std::size_t{1} << 22;
 
 // The numbers of a CSV file as an Arrow file that nobody else sees.
 ArrowTable as_arrow(const std::string& path, NumberFormat format) {
   RowsInOrder rows({path}, format);
   if (rows.columns().empty()) throw std::runtime_error(fmt::format("{}: there is a header and no rows", path));
-  std::string name = (std::filesystem::temp_directory_path() / "llmt_rows_XXXXXX").string();
-  const int made = ::mkstemp(name.data());
-  if (made < 0) throw std::runtime_error(fmt::format("{}: no temporary file can be made", name));
-  ::close(made);
-  try {
-    write_arrow(name, rows.columns(), [&] { return rows.next(); });
-    const ArrowTable table = ArrowTable::open(name);
-    ::unlink(name.c_str());
-    return table;
-  } catch (...) {
-    ::unlink(name.c_str());
-    throw;
-  }
+  return ArrowTable::hold(path, rows.columns(), [&] { return rows.next(); });
 }
 
 ArrowTable open_table(const std::string& path, NumberFormat format) {
@@ -45,12 +32,19 @@ ArrowTable open_table(const std::string& path, NumberFormat format) {
 
 // The first of `names` that is not among `others`.
 const std::string* first_missing(const std::vector<std::string>& names, const std::vector<std::string>& others) {
-  const auto found = std::ranges::find_if(
-      names, [&](const std::string& name) { return std::ranges::find(others, name) == others.end(); });
+  const std::unordered_set<std::string> known(others.begin(), others.end());
+  const auto found = std::ranges::find_if(names, [&](const std::string& name) { return !known.contains(name); });
   return found == names.end() ? nullptr : &*found;
 }
 
 }  // namespace
+
+Eigen::Index rows_at_once(std::size_t columns) {
+  constexpr std::size_t most_rows = 65536;
+  constexpr std::size_t most_cells = std::size_t{1} << 24;
+  return static_cast<Eigen::Index>(
+      std::clamp<std::size_t>(most_cells / std::max<std::size_t>(columns, 1), 1, most_rows));
+}
 
 RowsInOrder::RowsInOrder(std::vector<std::string> paths, NumberFormat format)
     : paths_(std::move(paths)), format_(format) {
@@ -68,7 +62,7 @@ void RowsInOrder::open() {
     columns = table_->columns();
   } else {
     text_ = std::ifstream(path, std::ios::binary);
-    if (!text_) throw std::runtime_error(fmt::format("{}: cannot be read", path));
+    if (!text_) throw std::runtime_error(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
     pieces_.emplace(text_, path, text_at_once, format_.mark);
     first_ = pieces_->next();
     if (!first_) return;
@@ -83,7 +77,7 @@ void RowsInOrder::open() {
 
 std::optional<Eigen::MatrixXd> RowsInOrder::next_of_file() {
   if (table_) {
-    const Eigen::Index count = std::min(rows_at_once, table_->rows() - row_);
+    const Eigen::Index count = std::min(rows_at_once(columns_.size()), table_->rows() - row_);
     if (count == 0) return std::nullopt;
     row_ += count;
     return table_->read(row_ - count, count, columns_);
@@ -141,8 +135,11 @@ Eigen::MatrixXd TableFiles::read(Eigen::Index first, Eigen::Index count, const s
     part(Eigen::all, places) = file.table.read(begin - file.first, end - begin, numbers);
     for (std::size_t k = 0; k < levels.size(); ++k) {
       if (levels[k].empty()) continue;
-      part.col(static_cast<Eigen::Index>(k)) =
-          category_values(file.table.texts(begin - file.first, end - begin, columns[k]), levels[k]);
+      for (Eigen::Index row = begin; row < end; row += rows_at_once(1)) {
+        const Eigen::Index few = std::min(rows_at_once(1), end - row);
+        part.col(static_cast<Eigen::Index>(k)).segment(row - begin, few) =
+            category_values(file.table.texts(row - file.first, few, columns[k]), levels[k]);
+      }
     }
   }
   return rows;
@@ -151,8 +148,8 @@ Eigen::MatrixXd TableFiles::read(Eigen::Index first, Eigen::Index count, const s
 std::vector<std::string> TableFiles::words_of(const std::string& column, std::size_t most) const {
   std::set<std::string> words;
   for (const File& file : files_) {
-    for (Eigen::Index first = 0; first < file.table.rows(); first += rows_at_once) {
-      const Eigen::Index count = std::min(rows_at_once, file.table.rows() - first);
+    for (Eigen::Index first = 0; first < file.table.rows(); first += rows_at_once(1)) {
+      const Eigen::Index count = std::min(rows_at_once(1), file.table.rows() - first);
       for (std::string& word : file.table.texts(first, count, column)) {
         if (!word.empty()) words.insert(std::move(word));
       }

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <limits>
 #include <stdexcept>
+#include <unordered_set>
 
 #include "llmt/files.hpp"
 #include "report/model/prediction.hpp"
@@ -20,16 +21,15 @@
 namespace llmt::apps {
 namespace {
 
-constexpr Eigen::Index rows_at_once = 65536;
-
 // The model's inputs, of which the table must have those that the model uses.
 class InputReader {
  public:
   InputReader(const TableFiles& table, const Model& model) : table_(table), inputs_(std::ssize(model.inputs())) {
     const std::vector<bool> used = used_inputs(model);
+    const std::unordered_set<std::string> known(table.columns().begin(), table.columns().end());
     for (std::size_t j = 0; j < model.inputs().size(); ++j) {
       const InputColumn& input = model.inputs()[j];
-      if (!used[j] && std::ranges::find(table.columns(), input.name) == table.columns().end()) continue;
+      if (!used[j] && !known.contains(input.name)) continue;
       levels_.push_back(input.codes.empty() ? input.levels : std::vector<std::string>());
       names_.push_back(input.name);
       places_.push_back(static_cast<Eigen::Index>(j));
@@ -84,8 +84,9 @@ void predict_files(const PredictArguments& arguments) {
     std::string text;
     for (const OutputColumn& output : model.outputs()) text += csv_field(output.name + "_pred", separator) + separator;
     sink(text + fmt::format("outside{0}outside_by{0}leverage\n", separator));
-    for (Eigen::Index first = 0; first < table.rows(); first += rows_at_once) {
-      const Eigen::Index count = std::min(rows_at_once, table.rows() - first);
+    const Eigen::Index most = rows_at_once(model.inputs().size());
+    for (Eigen::Index first = 0; first < table.rows(); first += most) {
+      const Eigen::Index count = std::min(most, table.rows() - first);
       const Eigen::MatrixXd inputs = reader.read(first, count);
       const Eigen::MatrixXd values = model.predict(inputs, arguments.threads);
       const std::vector<Extrapolation> extrapolation = model.extrapolation(inputs, arguments.threads);

@@ -10,7 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "apps/arrow_limits.hpp"
 #include "apps/programs.hpp"
+#include "apps/robot_limits.hpp"
 #include "llmt/boosted_model.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/distributed.hpp"
@@ -18,28 +20,15 @@
 #include "llmt/fit.hpp"
 #include "llmt/limits.hpp"
 #include "llmt/model.hpp"
-#include "llmt/robotics/mechanism/mechanism_file.hpp"
 #include "llmt/robotics/robot_file.hpp"
-#include "llmt/robotics/urdf.hpp"
 #include "oracles/chains.hpp"
 
 namespace {
 
+using limits::numbered;
+using limits::times;
 using llmt::Limit;
 using program::Folder;
-
-std::string times(std::int64_t count, const std::string& text) {
-  std::string all;
-  all.reserve(count * text.size());
-  for (std::int64_t k = 0; k < count; ++k) all += text;
-  return all;
-}
-
-std::string numbered(std::int64_t count, const char* pattern) {
-  std::string all;
-  for (std::int64_t k = 0; k < count; ++k) all += fmt::format(fmt::runtime(pattern), k);
-  return all;
-}
 
 // A file of so many bytes that takes no room on the disk.
 std::string sparse(const Folder& folder, std::int64_t bytes) {
@@ -93,42 +82,6 @@ void sum_with_slopes(std::int64_t slopes) {
   llmt::BoostedModel({{.name = "a", .low = 0.0, .high = 1.0}}, {{.name = "y", .low = 0.0, .high = 1.0}}, {1.0}, {sum});
 }
 
-void read_mechanism(const std::string& parameters, const std::string& joints, const std::string& equations) {
-  llmt::robotics::parse_mechanism(
-      fmt::format("mechanism: m\nparameters: [{}]\njoints: [{}]\nequations: [{}]\n", parameters, joints, equations),
-      "m");
-}
-
-const std::string any_joint = "{name: q, start_deg: 0, limits_deg: [-9, 9]},";
-
-void read_robot(std::int64_t joints, const std::string& effects) {
-  std::string text = "name: r\nconvention: dh\njoints:\n";
-  text += numbered(joints, "  - {{name: j{}, type: revolute, alpha_deg: 90, a_mm: 100, d_mm: 0, theta_deg: 0}}\n");
-  llmt::robotics::parse_robot(text + "effects:\n" + effects, "r");
-}
-
-// Effects with `values` coefficients each.
-std::string effects(std::int64_t count, std::int64_t values) {
-  const std::string terms = numbered(values, "{{name: c{0}, x: q1, unit: mm, scale: 1}},");
-  std::string all;
-  for (std::int64_t k = 0; k < count; ++k) {
-    all += fmt::format("  - {{type: formula, name: f{}, terms: [{}], coefficients: [{}]}}\n", k, terms,
-                       times(values, "0,"));
-  }
-  return all;
-}
-
-const std::string one_more =
-    "  - {type: formula, name: g, terms: [{name: c, x: q1, unit: mm, scale: 1}], coefficients: [0]}\n";
-
-void read_urdf(const std::string& links, const std::string& more) {
-  llmt::robotics::parse_urdf(
-      "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/>" + links +
-          "<joint name=\"j\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/><axis xyz=\"0 0 1\"/></joint>" +
-          more + "</robot>",
-      "r", {.base = "a", .tip = "b"});
-}
-
 void run(const Folder& folder, const std::string& command) {
   const program::Outcome outcome = folder.run(command);
   if (outcome.exit_code != 0) throw std::runtime_error(outcome.err);
@@ -159,6 +112,12 @@ void ask(Limit limit, double size) {
   switch (limit) {
     case Limit::table_line:
       llmt::Csv::read(folder.write("t.csv", "a\n" + std::string(count, '1') + "\n"));
+      return;
+    case Limit::arrow_metadata:
+    case Limit::arrow_columns:
+    case Limit::arrow_batches:
+    case Limit::arrow_word:
+      arrow_limits::ask(folder, limit, count);
       return;
     case Limit::magnitude:
       fit_magnitude(1.0, size, llmt::LocalTerms::linear);
@@ -201,39 +160,40 @@ void ask(Limit limit, double size) {
       llmt::robotics::parse_robot("a: [" + times(count - 3, "0,") + "]", "r");
       return;
     case Limit::expression_characters:
-      read_mechanism("", any_joint, "'" + std::string(count - 5, ' ') + "q = 0'");
+      limits::read_mechanism("", limits::any_joint, "'" + std::string(count - 5, ' ') + "q = 0'");
       return;
     case Limit::mechanism_parameters:
-      read_mechanism(numbered(count, "{{name: p{}, value: 1}},"), any_joint, "q = 0");
+      limits::read_mechanism(numbered(count, "{{name: p{}, value: 1}},"), limits::any_joint, "q = 0");
       return;
     case Limit::mechanism_coordinates:
-      read_mechanism("", numbered(count, "{{name: q{}, start_deg: 0, limits_deg: [-9, 9]}},"), "q0 = 0");
+      limits::read_mechanism("", numbered(count, "{{name: q{}, start_deg: 0, limits_deg: [-9, 9]}},"), "q0 = 0");
       return;
     case Limit::mechanism_equations:
-      read_mechanism("", any_joint, times(count, "q = 0,"));
+      limits::read_mechanism("", limits::any_joint, times(count, "q = 0,"));
       return;
     case Limit::robot_joints:
-      read_robot(count, "");
+      limits::read_robot(count, "");
       return;
     case Limit::robot_effects:
-      read_robot(1, effects(count, 1));
+      limits::read_robot(1, limits::effects(count, 1));
       return;
     case Limit::robot_effect_values:
-      read_robot(1, effects(10, count / 10) + times(count % 10, one_more));
+      limits::read_robot(1, limits::effects(10, count / 10) + times(count % 10, limits::one_more));
       return;
     case Limit::urdf_levels:  // within the robot
-      read_urdf("", times(count - 1, "<a>") + times(count - 1, "</a>"));
+      limits::read_urdf("", times(count - 1, "<a>") + times(count - 1, "</a>"));
       return;
     case Limit::urdf_attributes:
-      read_urdf("", "<a " + numbered(count, "x{}=\"\" ") + "/>");
+      limits::read_urdf("", "<a " + numbered(count, "x{}=\"\" ") + "/>");
       return;
     case Limit::urdf_nodes:  // seven are there
-      read_urdf("", times(count - 7, "<a/>"));
+      limits::read_urdf("", times(count - 7, "<a/>"));
       return;
     case Limit::urdf_links:  // two are there
-      read_urdf(numbered(count - 2, "<link name=\"k{0}\"/>"),
-                numbered(count - 2,
-                         "<joint name=\"j{0}\" type=\"fixed\"><parent link=\"a\"/><child link=\"k{0}\"/></joint>"));
+      limits::read_urdf(
+          numbered(count - 2, "<link name=\"k{0}\"/>"),
+          numbered(count - 2,
+                   "<joint name=\"j{0}\" type=\"fixed\"><parent link=\"a\"/><child link=\"k{0}\"/></joint>"));
       return;
     case Limit::simulated_poses:
       run(folder, fmt::format("{} simulate /dev/null --poses {} -o p.csv", program::robot_program, count));
@@ -252,6 +212,11 @@ std::string refusal(Limit limit) {
   switch (limit) {
     case Limit::table_line:
       return "no line ends within 16 MiB";
+    case Limit::arrow_metadata:
+    case Limit::arrow_columns:
+    case Limit::arrow_batches:
+    case Limit::arrow_word:
+      return arrow_limits::refusal(limit);
     case Limit::magnitude:
       return "at most 1e150";
     case Limit::quadratic_magnitude:

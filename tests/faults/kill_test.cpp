@@ -52,6 +52,35 @@ TEST(Kills, AtRandomTimesLeaveTheOldFileOrTheNewOne) {
   }
 }
 
+// A fit of several CSV files keeps their rows in the folder for temporary files.
+TEST(Kills, LeaveNothingInTheFolderForTemporaryFiles) {
+  JobFolder at({"env TMPDIR=tmp " LLMT_PROGRAM
+                " fit long.csv long.csv --target y --memory 2M --cv 0 --threads 1 -o out/m.json",
+                {"m.json"}});
+  llmt::Random random(57);
+  std::string text = "a,b,y\n";
+  for (int i = 0; i < 20000; ++i) {
+    const double a = random.uniform();
+    text += fmt::format("{:.5f},{:.5f},{:.5f}\n", a, random.uniform(), 2.0 * a);
+  }
+  at.folder.write("long.csv", text);
+  const std::filesystem::path kept = at.folder.file("tmp");
+  std::filesystem::create_directory(kept);
+  const auto begin = std::chrono::steady_clock::now();
+  at.learn_new_content();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  EXPECT_TRUE(std::filesystem::is_empty(kept));
+  for (const int signal : {SIGTERM, SIGINT, SIGKILL}) {
+    for (int i = 0; i < 8; ++i) {
+      const pid_t process = start(at);
+      std::this_thread::sleep_for(std::chrono::duration<double>(random.uniform(0.0, 0.6 * seconds)));
+      ::kill(process, signal);
+      wait_for(process);
+      EXPECT_TRUE(std::filesystem::is_empty(kept)) << signal;
+    }
+  }
+}
+
 TEST(TwoProcesses, OnOneOutputLeaveItWhole) {
   JobFolder at(faults::fit_job());
   at.write_tables();

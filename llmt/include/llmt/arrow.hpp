@@ -18,6 +18,9 @@
 
 namespace llmt {
 
+/// Gives the next rows, as many columns as names; nothing at the end.
+using NextRows = std::function<std::optional<Eigen::MatrixXd>()>;
+
 /// An Arrow IPC file of flat columns, opened for reading. What is read are integers of 8 to 64 bits and floating-point
 /// numbers of 32 and 64 bits, and text, whole or by a dictionary, with or without missing values; columns of dates and
 /// other flat types may be there.
@@ -27,9 +30,16 @@ namespace llmt {
 class ArrowTable {
  public:
   /// Reads what describes the table. The file may be of any origin: throws std::runtime_error, starting with `path`, if
-  /// it cannot be read, is no Arrow file, is cut off, describes parts that lie outside of it or do not go together, is
-  /// compressed, big-endian, or has nested columns.
+  /// it cannot be read, is no Arrow file, is cut off, describes parts that lie outside of it, overlap or do not go
+  /// together, is beyond the limits of docs/threat-model.md, is compressed, big-endian, or has nested columns. A
+  /// process that has many tables open opens the file again when it is read; it must then still be there.
   static ArrowTable open(const std::string& path);
+
+  /// Rows as write_arrow() takes them, in a file in the folder for temporary files ($TMPDIR, or /tmp) that has no name:
+  /// it is gone with the last copy of the table, or with the process, however that ends. `name` is path() and begins
+  /// the errors. Throws as write_arrow(), and std::runtime_error `name: ...` with the folder if the file cannot be made
+  /// or written.
+  static ArrowTable hold(const std::string& name, const std::vector<std::string>& columns, const NextRows& next);
 
   const std::string& path() const;
   const std::vector<std::string>& columns() const;
@@ -55,12 +65,10 @@ class ArrowTable {
 /// Whether a file begins as an Arrow file does. False for what is no regular file or cannot be read.
 bool is_arrow_file(const std::string& path);
 
-/// Gives the next rows, as many columns as names; nothing at the end.
-using NextRows = std::function<std::optional<Eigen::MatrixXd>()>;
-
-/// Writes a table of 64-bit floating-point numbers, NaN as missing, in batches of at most 65536 rows, through a
-/// temporary file as write_file(). Returns the number of rows. Throws std::invalid_argument if there is no name, a name
-/// is repeated, or rows have another number of columns; what `next` throws; and as write_file().
+/// Writes a table of 64-bit floating-point numbers, NaN as missing, in batches of at most 65536 rows and 2^24 cells
+/// (but at least a row), through a temporary file as write_file(). Returns the number of rows. Throws
+/// std::invalid_argument if there is no name, a name is repeated, or rows have another number of columns; what `next`
+/// throws; and as write_file().
 Eigen::Index write_arrow(const std::string& path, const std::vector<std::string>& columns, const NextRows& next);
 
 }  // namespace llmt

@@ -13,6 +13,10 @@ namespace llmt {
 /// What is bounded; limit_table says it in words.
 enum class Limit {
   table_line,
+  arrow_metadata,
+  arrow_columns,
+  arrow_batches,
+  arrow_word,
   magnitude,
   quadratic_magnitude,
   categories,
@@ -56,6 +60,13 @@ struct LimitRow {
 inline constexpr std::array limit_table = std::to_array<LimitRow>({
     {Limit::table_line, "line of a table; with `--stream` also a row with line breaks in quotes", 16 << 20,
      LimitUnit::bytes, "refused"},
+    {Limit::arrow_metadata, "metadata of an Arrow file: its footer, and those of a batch", 1 << 28, LimitUnit::bytes,
+     "refused with file and batch"},
+    {Limit::arrow_columns, "columns of an Arrow file", 1'000'000, LimitUnit::count, "refused"},
+    {Limit::arrow_batches, "batches of an Arrow file, and its dictionaries", 1'000'000, LimitUnit::count, "refused"},
+    // A row names a word in one byte, and 65 536 rows are read at a time: 256 MiB.
+    {Limit::arrow_word, "word of a dictionary of an Arrow file, bytes", 4096, LimitUnit::count,
+     "refused with file and column where it is read"},
     {Limit::magnitude, "magnitude of a number to learn from", 1e150, LimitUnit::power,
      "refused with file, line and column"},
     {Limit::quadratic_magnitude, "the same with `--local-models quadratic`", 1e70, LimitUnit::power,

@@ -4,22 +4,20 @@
 #pragma once
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <Eigen/Core>
 #include <array>
-#include <cerrno>
 #include <cstdint>
-#include <cstring>
 #include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "arrow/flatbuffer.hpp"
-#include "base/descriptor.hpp"
+#include "arrow/table_bytes.hpp"
 #include "llmt/arrow.hpp"
 
 namespace llmt {
@@ -38,6 +36,7 @@ struct Column {
   Text text = Text::none;
   std::optional<std::int64_t> dictionary;  ///< its number; `text` are its values
   std::size_t buffers = 2;
+  std::size_t first_buffer = 0;  ///< among those of a batch
 
   bool is_number() const { return numbers != Numbers::none && !dictionary; }
 };
@@ -48,6 +47,20 @@ struct Batch {
   std::int64_t body = 0;                             ///< where it begins in the file
   std::vector<std::int64_t> missing;                 ///< of every column
   std::vector<std::array<std::int64_t, 2>> buffers;  ///< offset in the body, and length
+};
+
+/// The words of a column of text that has each of them once.
+struct Dictionary {
+  std::vector<std::string> words;
+  std::size_t longest = 0;  ///< bytes of a word
+};
+
+/// A message of the file: where its metadata begin, how long they are, and how long the body behind them is.
+struct Block {
+  std::int64_t begin = 0;
+  std::int64_t metadata = 0;
+  std::int64_t body = 0;
+  std::string name;  ///< "batch 3": for errors
 };
 
 inline std::size_t bytes_of(Numbers numbers) {
@@ -72,35 +85,23 @@ inline std::size_t bytes_of(Numbers numbers) {
 }  // namespace arrow_file
 
 struct ArrowTable::Parts {
-  std::string path;
-  Descriptor file;
-  std::int64_t size = 0;
+  explicit Parts(TableBytes of) : bytes(std::move(of)), size(bytes.size()) {}
+
+  TableBytes bytes;
+  std::int64_t size;
   std::vector<arrow_file::Column> columns;
   std::vector<std::string> names;
+  std::unordered_map<std::string, std::size_t> places;               ///< of the names
+  std::unordered_map<std::int64_t, std::size_t> dictionary_columns;  ///< the first column of each dictionary
   std::vector<arrow_file::Batch> batches;
-  std::map<std::int64_t, std::vector<std::string>> dictionaries;  ///< of text
+  std::map<std::int64_t, arrow_file::Dictionary> dictionaries;  ///< of text
   Eigen::Index rows = 0;
 
-  [[noreturn]] void fail(const std::string& why) const { throw std::runtime_error(fmt::format("{}: {}", path, why)); }
+  [[noreturn]] void fail(const std::string& why) const { bytes.fail(why); }
 
-  std::string read(std::int64_t at, std::int64_t count) const {
-    if (at < 0 || count < 0 || at > size || count > size - at) fail("a part lies outside of the file; it is cut off");
-    std::string bytes(static_cast<std::size_t>(count), '\0');
-    for (std::int64_t done = 0; done < count;) {
-      const ssize_t got =
-          ::pread(file.number(), bytes.data() + done, static_cast<std::size_t>(count - done), at + done);
-      if (got < 0 && errno == EINTR) continue;
-      if (got < 0) fail(fmt::format("cannot be read: {}", std::strerror(errno)));
-      if (got == 0) fail("became shorter while it was read");
-      done += got;
-    }
-    return bytes;
-  }
+  std::string read(std::int64_t at, std::int64_t count) const { return bytes.read(at, count); }
 
   const arrow_file::Column& column(const std::string& name) const;
-
-  /// The first buffer of a column among those of a batch.
-  std::size_t first_buffer(const arrow_file::Column& column) const;
 
   /// Rows begin ... end - 1 of a batch; NaN where a value is missing.
   void read_numbers(const arrow_file::Batch& batch, const arrow_file::Column& column, Eigen::Index begin,
@@ -113,9 +114,10 @@ struct ArrowTable::Parts {
   std::vector<std::string> read_texts(const arrow_file::Batch& batch, std::size_t buffer, arrow_file::Text text,
                                       Eigen::Index begin, Eigen::Index end, const std::string& column) const;
 
-  void read_schema(const FlatTable& schema);
-  void read_dictionary(std::string_view block);
-  void read_batch(std::string_view block);
+  /// `most_bytes`: of all names together, which are those of the footer.
+  void read_schema(const FlatTable& schema, std::size_t most_bytes);
+  void read_dictionary(const arrow_file::Block& block);
+  void read_batch(const arrow_file::Block& block);
   void read_all();
 };
 

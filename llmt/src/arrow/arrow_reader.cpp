@@ -6,8 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <iterator>
 #include <limits>
 #include <optional>
@@ -16,8 +14,10 @@
 
 #include "arrow/arrow_format.hpp"
 #include "arrow/arrow_parts.hpp"
+#include "arrow/arrow_writer.hpp"
 #include "arrow/flatbuffer.hpp"
 #include "llmt/arrow.hpp"
+#include "llmt/limits.hpp"
 
 namespace llmt {
 
@@ -26,8 +26,6 @@ namespace {
 using namespace arrow_file;
 
 using namespace arrow_format;
-
-constexpr std::int64_t largest_metadata = std::int64_t{1} << 28;
 
 // The numbers that an Int table describes.
 Numbers integers_of(const FlatTable& described) {
@@ -71,23 +69,35 @@ std::size_t buffers_of(std::uint8_t kind, const std::string& name) {
 
 }  // namespace
 
-void ArrowTable::Parts::read_schema(const FlatTable& schema) {
+void ArrowTable::Parts::read_schema(const FlatTable& schema, std::size_t most_bytes) {
   if (schema.number<std::int16_t>(schema::endianness, 0) != 0) fail("is big-endian");
-  for (const FlatTable& field : schema.tables(schema::fields)) {
+  const std::vector<std::string_view> fields = schema.structs(schema::fields, 4);
+  if (std::ssize(fields) > most(Limit::arrow_columns))
+    fail(fmt::format("has {} columns; at most {} are read", fields.size(), most(Limit::arrow_columns)));
+  std::size_t bytes_of_names = 0;
+  std::size_t buffers = 0;
+  for (const std::string_view reference : fields) {
+    const FlatTable field = schema.table_at(reference);
     Column column;
     column.name = field.has(field::name) ? std::string(field.text(field::name)) : std::string();
+    // Names that lie in each other would be more text than the file has.
+    bytes_of_names += column.name.size();
+    if (bytes_of_names > most_bytes) fail("the metadata is damaged: names of columns overlap");
     const auto kind = field.number<std::uint8_t>(field::type_type, 0);
     column.text = text_of(kind);
     if (field.has(field::dictionary)) {
       const FlatTable encoding = field.table(field::dictionary);
       column.dictionary = encoding.number<std::int64_t>(dictionary::id, 0);
+      dictionary_columns.emplace(*column.dictionary, columns.size());
       column.numbers =
           encoding.has(dictionary::index_type) ? integers_of(encoding.table(dictionary::index_type)) : Numbers::int32;
     } else {
       column.numbers = numbers_of(field, kind);
       column.buffers = buffers_of(kind, column.name);
     }
-    if (std::ranges::find(names, column.name) != names.end()) fail(fmt::format("two columns \"{}\"", column.name));
+    column.first_buffer = buffers;
+    buffers += column.buffers;
+    if (!places.emplace(column.name, columns.size()).second) fail(fmt::format("two columns \"{}\"", column.name));
     names.push_back(column.name);
     columns.push_back(std::move(column));
   }
@@ -109,37 +119,86 @@ struct Message {
   }
 };
 
-Message read_message(const ArrowTable::Parts& parts, std::string_view block) {
-  const auto offset = FlatTable::load<std::int64_t>(block, 0);
-  const auto metadata = FlatTable::load<std::int32_t>(block, 8);
-  if (metadata < 8 || metadata > largest_metadata) parts.fail("a batch has metadata of an impossible length");
-  Message message{parts.read(offset, metadata), offset + metadata, FlatTable::load<std::int64_t>(block, 16)};
-  if (message.body_length < 0 || message.body > parts.size || message.body_length > parts.size - message.body) {
-    parts.fail("a batch lies outside of the file; it is cut off");
+Message read_message(const ArrowTable::Parts& parts, const Block& block) {
+  return {parts.read(block.begin, block.metadata), block.begin + block.metadata, block.body};
+}
+
+// Where the messages lie that an entry of the footer lists.
+void add_blocks(const ArrowTable::Parts& parts, const FlatTable& footer, int entry, const char* what,
+                std::vector<Block>& blocks) {
+  const std::vector<std::string_view> given = footer.structs(entry, 24);
+  if (std::ssize(given) > most(Limit::arrow_batches)) {
+    parts.fail(fmt::format("has {} batches or dictionaries; at most {} are read, write longer batches", given.size(),
+                           most(Limit::arrow_batches)));
   }
-  return message;
+  for (std::size_t k = 0; k < given.size(); ++k) {
+    const Block block{FlatTable::load<std::int64_t>(given[k], 0), FlatTable::load<std::int32_t>(given[k], 8),
+                      FlatTable::load<std::int64_t>(given[k], 16), fmt::format("{} {}", what, k + 1)};
+    if (block.metadata < 8) parts.fail(fmt::format("{} has metadata of an impossible length", block.name));
+    if (block.metadata > most(Limit::arrow_metadata)) {
+      parts.fail(fmt::format("{} has {} bytes of metadata; at most {} are read", block.name, block.metadata,
+                             most(Limit::arrow_metadata)));
+    }
+    if (block.begin < 0 || block.body < 0 || block.begin > parts.size || block.metadata > parts.size - block.begin ||
+        block.body > parts.size - block.begin - block.metadata) {
+      parts.fail(fmt::format("{} lies outside of the file; it is cut off", block.name));
+    }
+    blocks.push_back(block);
+  }
+}
+
+// Refuses a file that names the same bytes several times: it would be a larger table than it has bytes.
+void refuse_overlap(const ArrowTable::Parts& parts, const std::vector<Block>& blocks) {
+  std::vector<const Block*> order;
+  for (const Block& block : blocks) order.push_back(&block);
+  std::ranges::stable_sort(order, {}, &Block::begin);
+  for (std::size_t k = 1; k < order.size(); ++k) {
+    const Block& before = *order[k - 1];
+    if (order[k]->begin >= before.begin + before.metadata + before.body) continue;
+    parts.fail(fmt::format("{} and {} overlap", before.name, order[k]->name));
+  }
+}
+
+// The same for the buffers of a message.
+void refuse_overlap(const ArrowTable::Parts& parts, const Batch& batch, const std::string& name) {
+  std::vector<std::array<std::int64_t, 2>> order;
+  for (const std::array<std::int64_t, 2>& buffer : batch.buffers) {
+    if (buffer[1] > 0) order.push_back(buffer);
+  }
+  std::ranges::sort(order);
+  for (std::size_t k = 1; k < order.size(); ++k) {
+    if (order[k][0] < order[k - 1][0] + order[k - 1][1]) parts.fail(fmt::format("columns of {} overlap", name));
+  }
 }
 
 // Columns of a batch of rows, or the one of a dictionary.
-Batch batch_of(const ArrowTable::Parts& parts, const Message& message, const FlatTable& header, std::size_t columns) {
+Batch batch_of(const ArrowTable::Parts& parts, const Message& message, const FlatTable& header, std::size_t columns,
+               const std::string& name) {
   if (header.has(batch::compression)) parts.fail("is compressed; write it without compression");
   Batch result;
   result.rows = header.number<std::int64_t>(batch::length, 0);
   result.body = message.body;
   const std::vector<std::string_view> nodes = header.structs(batch::nodes, 16);
-  if (result.rows < 0 || nodes.size() != columns) parts.fail("a batch does not have the columns of the file");
+  if (result.rows < 0 || nodes.size() != columns)
+    parts.fail(fmt::format("{} does not have the columns of the file", name));
+  if (result.rows / 8 + (result.rows % 8 != 0 ? 1 : 0) > message.body_length) {  // a row has at least a bit
+    parts.fail(fmt::format("{} has {} rows in {} bytes", name, result.rows, message.body_length));
+  }
   for (const std::string_view node : nodes) {
-    if (FlatTable::load<std::int64_t>(node, 0) != result.rows) parts.fail("columns of a batch have different lengths");
+    if (FlatTable::load<std::int64_t>(node, 0) != result.rows) {
+      parts.fail(fmt::format("columns of {} have different lengths", name));
+    }
     result.missing.push_back(FlatTable::load<std::int64_t>(node, 8));
   }
   for (const std::string_view buffer : header.structs(batch::buffers, 16)) {
     const auto begin = FlatTable::load<std::int64_t>(buffer, 0);
     const auto length = FlatTable::load<std::int64_t>(buffer, 8);
     if (begin < 0 || length < 0 || begin > message.body_length || length > message.body_length - begin) {
-      parts.fail("a column lies outside of its batch");
+      parts.fail(fmt::format("a column lies outside of {}", name));
     }
     result.buffers.push_back({begin, length});
   }
+  refuse_overlap(parts, result, name);
   return result;
 }
 
@@ -158,40 +217,43 @@ void check_lengths(const ArrowTable::Parts& parts, const Batch& batch, std::size
 
 }  // namespace
 
-void ArrowTable::Parts::read_dictionary(std::string_view block) {
+void ArrowTable::Parts::read_dictionary(const Block& block) {
   const Message message = read_message(*this, block);
   const FlatTable root = message.root();
   if (root.number<std::uint8_t>(message::header_type, 0) != message::is_dictionary) fail("a dictionary is none");
   const FlatTable header = root.table(message::header);
   const auto id = header.number<std::int64_t>(dictionary_batch::id, 0);
-  const auto column = std::ranges::find(columns, std::optional(id), &Column::dictionary);
-  if (column == columns.end() || column->text == Text::none) return;
-  const Batch batch = batch_of(*this, message, header.table(dictionary_batch::data), 1);
-  if (batch.buffers.size() < 3) fail(fmt::format("the dictionary of column \"{}\" is damaged", column->name));
-  check_lengths(*this, batch, 0, column->text == Text::small ? 4 : 8, true, batch.missing.front(), column->name);
+  const auto place = dictionary_columns.find(id);
+  if (place == dictionary_columns.end() || columns[place->second].text == Text::none) return;
+  const Column& column = columns[place->second];
+  const Batch batch = batch_of(*this, message, header.table(dictionary_batch::data), 1, block.name);
+  if (batch.buffers.size() < 3) fail(fmt::format("the dictionary of column \"{}\" is damaged", column.name));
+  check_lengths(*this, batch, 0, column.text == Text::small ? 4 : 8, true, batch.missing.front(), column.name);
   const bool is_delta = header.number<std::uint8_t>(dictionary_batch::is_delta, 0) != 0;
-  std::vector<std::string>& words = dictionaries[id];
-  if (!is_delta && !words.empty()) fail(fmt::format("column \"{}\" has two dictionaries", column->name));
-  std::vector<std::string> more = read_texts(batch, 0, column->text, 0, batch.rows, column->name);
-  words.insert(words.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+  Dictionary& dictionary = dictionaries[id];
+  if (!is_delta && !dictionary.words.empty()) fail(fmt::format("column \"{}\" has two dictionaries", column.name));
+  for (std::string& word : read_texts(batch, 0, column.text, 0, batch.rows, column.name)) {
+    dictionary.longest = std::max(dictionary.longest, word.size());
+    dictionary.words.push_back(std::move(word));
+  }
 }
 
-void ArrowTable::Parts::read_batch(std::string_view block) {
+void ArrowTable::Parts::read_batch(const Block& block) {
   const Message message = read_message(*this, block);
   const FlatTable root = message.root();
   if (root.number<std::uint8_t>(message::header_type, 0) != message::is_batch) fail("a batch of rows is none");
-  Batch result = batch_of(*this, message, root.table(message::header), columns.size());
+  Batch result = batch_of(*this, message, root.table(message::header), columns.size(), block.name);
   result.first = rows;
-  std::size_t first = 0;
+  if (columns.back().first_buffer + columns.back().buffers > result.buffers.size()) {
+    fail(fmt::format("{} does not have the columns of the file", block.name));
+  }
   for (std::size_t j = 0; j < columns.size(); ++j) {
     const Column& column = columns[j];
-    if (first + column.buffers > result.buffers.size()) fail("a batch does not have the columns of the file");
     const bool has_offsets = column.text != Text::none && !column.dictionary;
     const std::size_t bytes_each = has_offsets ? (column.text == Text::small ? 4 : 8) : bytes_of(column.numbers);
     if (bytes_each > 0) {
-      check_lengths(*this, result, first, bytes_each, has_offsets, result.missing[j], column.name);
+      check_lengths(*this, result, column.first_buffer, bytes_each, has_offsets, result.missing[j], column.name);
     }
-    first += column.buffers;
   }
   if (result.rows > std::numeric_limits<Eigen::Index>::max() - rows) fail("has more rows than can be counted");
   rows += result.rows;
@@ -203,36 +265,50 @@ void ArrowTable::Parts::read_all() {
   constexpr std::int64_t tail = 4 + magic_size;
   if (size < 8 + tail || read(0, magic_size) != magic) fail("is no Arrow file");
   const std::string end = read(size - tail, tail);
-  if (end.substr(4) != magic) fail("has no end: it is cut off, or an Arrow stream, which must be written as a file");
+  if (end.substr(4) != magic) fail("has no end; it is cut off");
   const auto length = FlatTable::load<std::int32_t>(end, 0);
-  if (length < 8 || length > largest_metadata || length > size - tail - 8) fail("has a footer of an impossible length");
-  const std::string bytes = read(size - tail - length, length);
-  const FlatTable footer = FlatTable::root(bytes);
+  if (length > most(Limit::arrow_metadata))
+    fail(fmt::format("has a footer of {} bytes; at most {} are read", length, most(Limit::arrow_metadata)));
+  if (length < 8 || length > size - tail - 8) fail("has a footer of an impossible length");
+  const std::string footer_bytes = read(size - tail - length, length);
+  const FlatTable footer = FlatTable::root(footer_bytes);
   if (footer.number<std::int16_t>(footer::version, 0) < version_5 - 1) fail("is older than metadata version 4");
-  read_schema(footer.table(footer::schema));
-  for (const std::string_view block : footer.structs(footer::dictionaries, 24)) read_dictionary(block);
-  for (const std::string_view block : footer.structs(footer::batches, 24)) read_batch(block);
+  read_schema(footer.table(footer::schema), footer_bytes.size());
+  std::vector<Block> blocks;
+  add_blocks(*this, footer, footer::dictionaries, "dictionary", blocks);
+  const std::size_t dictionary_blocks = blocks.size();
+  add_blocks(*this, footer, footer::batches, "batch", blocks);
+  refuse_overlap(*this, blocks);
+  for (std::size_t k = 0; k < blocks.size(); ++k)
+    k < dictionary_blocks ? read_dictionary(blocks[k]) : read_batch(blocks[k]);
 }
 
-ArrowTable ArrowTable::open(const std::string& path) {
-  auto parts = std::make_shared<Parts>();
-  parts->path = path;
-  parts->file = Descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  struct stat status {};
-  if (!parts->file.is_open() || ::fstat(parts->file.number(), &status) != 0) {
-    parts->fail(fmt::format("cannot be read: {}", std::strerror(errno)));
-  }
-  if (!S_ISREG(status.st_mode)) parts->fail("is no regular file");
-  parts->size = status.st_size;
+namespace {
+
+std::shared_ptr<const ArrowTable::Parts> parts_of(TableBytes bytes) {
+  auto parts = std::make_shared<ArrowTable::Parts>(std::move(bytes));
   try {
     parts->read_all();
   } catch (const std::runtime_error& error) {
     const std::string_view message = error.what();
-    if (message.starts_with(path + ": ")) throw;
+    if (message.starts_with(parts->bytes.name() + ": ")) throw;
     parts->fail(error.what());
   }
+  parts->bytes.release_if_many();
+  return parts;
+}
+
+}  // namespace
+
+ArrowTable ArrowTable::open(const std::string& path) {
   ArrowTable table;
-  table.parts_ = std::move(parts);
+  table.parts_ = parts_of(TableBytes(path));
+  return table;
+}
+
+ArrowTable ArrowTable::hold(const std::string& name, const std::vector<std::string>& columns, const NextRows& next) {
+  ArrowTable table;
+  table.parts_ = parts_of(held_rows(name, columns, next));
   return table;
 }
 

@@ -6,8 +6,10 @@
 #include <cstring>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "arrow/arrow_parts.hpp"
+#include "llmt/limits.hpp"
 
 namespace llmt {
 
@@ -63,22 +65,15 @@ std::vector<std::int64_t> offsets_of(const std::string& bytes) {
 }  // namespace
 
 const Column& ArrowTable::Parts::column(const std::string& name) const {
-  const auto found = std::ranges::find(columns, name, &Column::name);
-  if (found == columns.end()) fail(fmt::format("there is no column \"{}\"", name));
-  return *found;
-}
-
-std::size_t ArrowTable::Parts::first_buffer(const Column& column) const {
-  std::size_t first = 0;
-  for (const Column* before = columns.data(); before != &column; ++before) first += before->buffers;
-  return first;
+  const auto found = places.find(name);
+  if (found == places.end()) fail(fmt::format("there is no column \"{}\"", name));
+  return columns[found->second];
 }
 
 void ArrowTable::Parts::read_numbers(const Batch& batch, const Column& column, Eigen::Index begin, Eigen::Index end,
                                      Eigen::Ref<Eigen::VectorXd> to) const {
-  const std::size_t buffer = first_buffer(column);
   const auto each = static_cast<std::int64_t>(bytes_of(column.numbers));
-  const std::int64_t values = batch.body + batch.buffers[buffer + 1][0];
+  const std::int64_t values = batch.body + batch.buffers[column.first_buffer + 1][0];
   convert(column.numbers, read(values + begin * each, (end - begin) * each), end - begin, to);
   const std::vector<bool> valid = read_valid(batch, column, begin, end);
   for (Eigen::Index i = 0; i < end - begin; ++i) {
@@ -90,7 +85,7 @@ std::vector<bool> ArrowTable::Parts::read_valid(const Batch& batch, const Column
                                                 Eigen::Index end) const {
   std::vector<bool> valid(static_cast<std::size_t>(end - begin), true);
   if (batch.missing[static_cast<std::size_t>(&column - columns.data())] == 0) return valid;
-  const std::int64_t bits = batch.body + batch.buffers[first_buffer(column)][0];
+  const std::int64_t bits = batch.body + batch.buffers[column.first_buffer][0];
   const std::string bytes = read(bits + begin / 8, (end + 7) / 8 - begin / 8);
   for (Eigen::Index i = begin; i < end; ++i) {
     const auto byte = static_cast<unsigned char>(bytes[static_cast<std::size_t>(i / 8 - begin / 8)]);
@@ -120,7 +115,7 @@ std::vector<std::string> ArrowTable::Parts::read_texts(const Batch& batch, std::
   return texts;
 }
 
-const std::string& ArrowTable::path() const { return parts_->path; }
+const std::string& ArrowTable::path() const { return parts_->bytes.name(); }
 const std::vector<std::string>& ArrowTable::columns() const { return parts_->names; }
 Eigen::Index ArrowTable::rows() const { return parts_->rows; }
 
@@ -164,21 +159,26 @@ std::vector<std::string> ArrowTable::texts(Eigen::Index first, Eigen::Index coun
   if (column.text == Text::none) parts_->fail(fmt::format("column \"{}\" holds no text", column.name));
   std::vector<std::string> result;
   const auto add_from_dictionary = [&](const Batch& batch, Eigen::Index begin, Eigen::Index end, Eigen::Index) {
-    const auto words = parts_->dictionaries.find(*column.dictionary);
-    const Eigen::Index size = words == parts_->dictionaries.end() ? 0 : std::ssize(words->second);
+    const auto dictionary = parts_->dictionaries.find(*column.dictionary);
+    const Eigen::Index size = dictionary == parts_->dictionaries.end() ? 0 : std::ssize(dictionary->second.words);
+    // A row names a word in a byte: without a limit a small file would be a large table.
+    if (size > 0 && std::cmp_greater(dictionary->second.longest, most(Limit::arrow_word))) {
+      parts_->fail(fmt::format("column \"{}\" has a word of {} bytes in its dictionary; at most {} are read",
+                               column.name, dictionary->second.longest, most(Limit::arrow_word)));
+    }
     Eigen::VectorXd places(end - begin);
     parts_->read_numbers(batch, column, begin, end, places);
     for (const double place : places) {
       if (!std::isnan(place) && !(place >= 0.0 && place < static_cast<double>(size))) {
         parts_->fail(fmt::format("column \"{}\" has words that its dictionary has not", column.name));
       }
-      result.push_back(std::isnan(place) ? std::string() : words->second[static_cast<std::size_t>(place)]);
+      result.push_back(std::isnan(place) ? std::string() : dictionary->second.words[static_cast<std::size_t>(place)]);
     }
   };
   const auto add_texts = [&](const Batch& batch, Eigen::Index begin, Eigen::Index end, Eigen::Index) {
     // The text of a missing cell is empty in what all programs write, but need not be.
     std::vector<std::string> texts =
-        parts_->read_texts(batch, parts_->first_buffer(column), column.text, begin, end, column.name);
+        parts_->read_texts(batch, column.first_buffer, column.text, begin, end, column.name);
     const std::vector<bool> valid = parts_->read_valid(batch, column, begin, end);
     for (std::size_t i = 0; i < texts.size(); ++i) result.push_back(valid[i] ? std::move(texts[i]) : std::string());
   };

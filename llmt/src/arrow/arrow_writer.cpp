@@ -1,14 +1,21 @@
 // Writing an Arrow file.
+#include "arrow/arrow_writer.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <bit>
+#include <cerrno>
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
 #include <set>
 #include <stdexcept>
 
 #include "arrow/arrow_format.hpp"
 #include "arrow/flatbuffer.hpp"
+#include "base/staged_file.hpp"
 #include "llmt/arrow.hpp"
 #include "llmt/files.hpp"
 
@@ -18,8 +25,6 @@ namespace {
 using namespace arrow_format;
 
 static_assert(std::endian::native == std::endian::little);
-
-constexpr Eigen::Index rows_of_batch = 65536;
 
 template <class T>
 void append_bytes(std::string& bytes, T value) {
@@ -159,37 +164,71 @@ class ArrowWriter {
   Eigen::Index rows_ = 0;
 };
 
-}  // namespace
+// Rows that are in memory at a time: those of a batch, fewer if there are many columns.
+Eigen::Index rows_of_batch(std::size_t columns) {
+  constexpr std::size_t most_rows = 65536;
+  constexpr std::size_t most_cells = std::size_t{1} << 24;
+  return static_cast<Eigen::Index>(std::clamp<std::size_t>(most_cells / columns, 1, most_rows));
+}
 
-Eigen::Index write_arrow(const std::string& path, const std::vector<std::string>& columns, const NextRows& next) {
+// Passes an Arrow file on in pieces. Returns the number of rows.
+Eigen::Index pass_rows(const TextSink& sink, const std::vector<std::string>& columns, const NextRows& next) {
+  ArrowWriter writer(sink, columns);
+  const Eigen::Index most = rows_of_batch(columns.size());
+  Eigen::MatrixXd waiting(0, std::ssize(columns));  // grows: a table of few rows takes no room for many
+  Eigen::Index filled = 0;
+  while (const std::optional<Eigen::MatrixXd> given = next()) {
+    if (given->cols() != std::ssize(columns)) {
+      throw std::invalid_argument(
+          fmt::format("llmt::write_arrow: rows have {} columns, there are {} names", given->cols(), columns.size()));
+    }
+    for (Eigen::Index done = 0; done < given->rows();) {
+      const Eigen::Index count = std::min(given->rows() - done, most - filled);
+      if (filled + count > waiting.rows()) {
+        waiting.conservativeResize(std::min(most, std::max(filled + count, 2 * waiting.rows())), Eigen::NoChange);
+      }
+      waiting.middleRows(filled, count) = given->middleRows(done, count);
+      done += count;
+      filled += count;
+      if (filled < most) continue;
+      writer.write_batch(waiting);
+      filled = 0;
+    }
+  }
+  if (filled > 0) writer.write_batch(waiting.topRows(filled));
+  return writer.finish();
+}
+
+void check_columns(const std::vector<std::string>& columns) {
   if (columns.empty()) throw std::invalid_argument("llmt::write_arrow: there is no column");
   if (std::set<std::string>(columns.begin(), columns.end()).size() < columns.size()) {
     throw std::invalid_argument("llmt::write_arrow: two columns have the same name");
   }
+}
+
+}  // namespace
+
+Eigen::Index write_arrow(const std::string& path, const std::vector<std::string>& columns, const NextRows& next) {
+  check_columns(columns);
   Eigen::Index rows = 0;
-  write_file(path, [&](const TextSink& sink) {
-    ArrowWriter writer(sink, columns);
-    Eigen::MatrixXd waiting(rows_of_batch, columns.size());
-    Eigen::Index filled = 0;
-    while (const std::optional<Eigen::MatrixXd> given = next()) {
-      if (given->cols() != std::ssize(columns)) {
-        throw std::invalid_argument(
-            fmt::format("llmt::write_arrow: rows have {} columns, there are {} names", given->cols(), columns.size()));
-      }
-      for (Eigen::Index done = 0; done < given->rows();) {
-        const Eigen::Index count = std::min(given->rows() - done, rows_of_batch - filled);
-        waiting.middleRows(filled, count) = given->middleRows(done, count);
-        done += count;
-        filled += count;
-        if (filled < rows_of_batch) continue;
-        writer.write_batch(waiting);
-        filled = 0;
-      }
-    }
-    if (filled > 0) writer.write_batch(waiting.topRows(filled));
-    rows = writer.finish();
-  });
+  write_file(path, [&](const TextSink& sink) { rows = pass_rows(sink, columns, next); });
   return rows;
+}
+
+TableBytes held_rows(const std::string& name, const std::vector<std::string>& columns, const NextRows& next) {
+  check_columns(columns);
+  const char* const asked = std::getenv("TMPDIR");
+  const std::filesystem::path folder = asked == nullptr || *asked == '\0' ? "/tmp" : asked;
+  const auto fail = [&] {
+    const int error = errno;
+    throw std::runtime_error(fmt::format(
+        "{}: its rows cannot be kept in {}, the folder for temporary files (TMPDIR): {}{}", name, folder.string(),
+        std::strerror(error), error == EMFILE ? "; llmt table makes one file of them" : ""));
+  };
+  Descriptor file = temporary_file(folder);
+  if (!file.is_open()) fail();
+  pass_rows([&](std::string_view piece) { write_all(file, piece) ? void() : fail(); }, columns, next);
+  return {name, std::move(file)};
 }
 
 }  // namespace llmt

@@ -59,13 +59,9 @@ class FlatTable {
     return found;
   }
 
-  std::vector<FlatTable> tables(int field) const {
-    std::vector<FlatTable> found;
-    for (const std::string_view entry : structs(field, 4)) {
-      const auto at = static_cast<std::size_t>(entry.data() - buffer_.data());
-      found.emplace_back(buffer_, follow(buffer_, at));
-    }
-    return found;
+  /// The table that an entry of a vector of references, structs() of four bytes, refers to.
+  FlatTable table_at(std::string_view entry) const {
+    return {buffer_, follow(buffer_, static_cast<std::size_t>(entry.data() - buffer_.data()))};
   }
 
   /// A number inside of a struct, or anywhere in a text.

@@ -60,13 +60,16 @@ std::string link_source(const Descriptor& file) { return fmt::format("/proc/self
 // A file without a name, which is gone with the process, however that ends. Not open where the file system has none.
 Descriptor open_nameless(const std::filesystem::path& folder, mode_t mode) {
 #ifdef O_TMPFILE
-  Descriptor file(::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, mode));
+  Descriptor file(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, mode));
   if (file.is_open() && ::access(link_source(file).c_str(), F_OK) == 0) return file;
   if (!file.is_open()) return file;
 #endif
   errno = EOPNOTSUPP;
   return Descriptor();
 }
+
+// File systems without nameless files answer with one of these errors; any other one is final.
+bool has_no_nameless(int error) { return error == EOPNOTSUPP || error == EISDIR || error == EINVAL || error == ENOSYS; }
 
 bool synchronise(const Descriptor& file) {
   return ::fsync(file.number()) == 0 || errno == EINVAL || errno == ENOTSUP;  // the last two: nothing to do there
@@ -99,6 +102,17 @@ void TemporaryName::remove_announced() noexcept {
   }
 }
 
+Descriptor temporary_file(const std::filesystem::path& folder) {
+  constexpr mode_t mode = 0600;
+  Descriptor file = open_nameless(folder, mode);
+  if (file.is_open() || !has_no_nameless(errno)) return file;
+  TemporaryName name(folder);  // removes the name again
+  name.announce();
+  file = Descriptor(::open(name.path(), O_CREAT | O_EXCL | O_NOFOLLOW | O_RDWR | O_CLOEXEC, mode));
+  name.set_made(file.is_open());
+  return file;
+}
+
 StagedFile::StagedFile(std::string name, std::filesystem::path target)
     : name_(std::move(name)),
       target_(std::move(target)),
@@ -128,8 +142,7 @@ void StagedFile::check(bool done) {
 void StagedFile::open(mode_t mode) {
   file_ = open_nameless(folder_, mode);
   if (file_.is_open()) return;
-  // File systems without nameless files answer with one of these errors; any other one is final.
-  check(errno == EOPNOTSUPP || errno == EISDIR || errno == EINVAL || errno == ENOSYS);
+  check(has_no_nameless(errno));
   temporary_.announce();
   file_ = Descriptor(::open(temporary_.path(), O_CREAT | O_EXCL | O_NOFOLLOW | O_WRONLY | O_CLOEXEC, mode));
   check(file_.is_open());

@@ -37,6 +37,10 @@ class TemporaryName {
   bool is_made_ = false;
 };
 
+/// A file in `folder`, open for reading and writing, that only this process can reach: it has no name, or where the
+/// file system has no such files only while it is made. Not open if it cannot be made; the reason is in errno.
+Descriptor temporary_file(const std::filesystem::path& folder);
+
 /// Content on its way. Until replace_target() nothing has changed at the target, and without it nothing is left. The
 /// steps after the last write are three, so that several files can take each of them together.
 class StagedFile {
