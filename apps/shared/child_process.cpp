@@ -129,7 +129,7 @@ ChildOutcome run_child(const std::string& command, std::string_view input, doubl
   in.do_not_wait(1);
   out.do_not_wait(0);
   err.do_not_wait(0);
-  const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+  const Clock::time_point begin = Clock::now();
   ChildOutcome outcome;
   std::size_t written = 0;
   bool has_ended = false;
@@ -152,7 +152,8 @@ ChildOutcome run_child(const std::string& command, std::string_view input, doubl
     // The child had ended before poll() found nothing, so all that it wrote has been read.
     if (has_ended && files[1].revents == 0 && files[2].revents == 0) break;
     has_ended = has_ended || is_over(child);
-    outcome.timed_out = Clock::now() > end && !has_ended;
+    // In doubles: the clock's own durations end after 292 years.
+    outcome.timed_out = std::chrono::duration<double>(Clock::now() - begin).count() > seconds && !has_ended;
     if (outcome.timed_out || outcome.overflowed) break;
   }
   ::kill(-child, SIGKILL);
