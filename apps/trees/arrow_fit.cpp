@@ -74,9 +74,25 @@ struct PassColumns {
   bool has_weight() const { return std::ssize(names) == inputs + 2; }
 };
 
+// What a state from a file makes of a table may go wrong in ways that only a pass shows: then the file is at fault. No
+// file: the state was made here.
+template <class Step>
+auto with_state_of(const std::string& file, const Step& step) {
+  try {
+    return step();
+  } catch (const std::bad_alloc&) {
+    if (file.empty()) throw;
+    throw std::runtime_error(fmt::format("{}: going on from it needs more memory than there is", file));
+  } catch (const std::exception& error) {
+    if (file.empty()) throw;
+    throw std::runtime_error(fmt::format("{}: {}", file, error.what()));
+  }
+}
+
 // One pass over the rows first ... last - 1, which begin with a block.
 distributed::Sums sum_rows(const TableFiles& table, RowRange range, const PassColumns& columns,
-                           const distributed::State& state, Eigen::Index block_rows, int threads, ProgressBar& bar) {
+                           const distributed::State& state, const std::string& state_file, Eigen::Index block_rows,
+                           int threads, ProgressBar& bar) {
   distributed::Sums all;
   for (Eigen::Index first = range.first; first < range.last; first += blocks_at_once * block_rows) {
     const Eigen::Index count = std::min(blocks_at_once * block_rows, range.last - first);
@@ -84,22 +100,22 @@ distributed::Sums sum_rows(const TableFiles& table, RowRange range, const PassCo
     check_rows(table, columns.names, columns.inputs, rows, first);
     distributed::Rows shard{rows.leftCols(columns.inputs), rows.col(columns.inputs), first / block_rows};
     if (columns.has_weight()) shard.weights = rows.col(columns.inputs + 1);
-    all = merge(std::move(all), distributed::sums(shard, state, threads));
+    all = with_state_of(state_file, [&] { return merge(std::move(all), distributed::sums(shard, state, threads)); });
     bar.show(first + count - range.first, range.last - range.first);
   }
   return all;
 }
 
-distributed::State first_state(const ArrowFitArguments& arguments, const std::vector<std::string>& inputs,
-                               const distributed::Options& options) {
+distributed::State first_state(const ArrowFitArguments& arguments, const std::string& state_file,
+                               const std::vector<std::string>& inputs, const distributed::Options& options) {
   const std::string& target = arguments.learning.targets.front();
   distributed::State state = distributed::start(inputs, target, options);
-  if (!arguments.resume || !std::filesystem::exists(arguments.checkpoint)) return state;
-  distributed::State saved = distributed::State::from_bytes(
-      read_file(arguments.checkpoint, {.bytes = std::uintmax_t{1} << 33}), arguments.checkpoint);
+  if (state_file.empty()) return state;
+  distributed::State saved =
+      distributed::State::from_bytes(read_file(state_file, {.bytes = std::uintmax_t{1} << 33}), state_file);
   if (!saved.continues(state)) {
-    throw std::runtime_error(fmt::format("{}: is of a fit of other columns or with other options, or another --memory",
-                                         arguments.checkpoint));
+    throw std::runtime_error(
+        fmt::format("{}: is of a fit of other columns or with other options, or another --memory", state_file));
   }
   return saved;
 }
@@ -193,20 +209,26 @@ void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& argumen
     options.levels = table.levels(inputs, most_words);
     set_columns(learning.columns, inputs, options.levels, options.fit);
   }
+  const bool goes_on = arguments.resume && std::filesystem::exists(arguments.checkpoint);
+  const std::string state_file = goes_on ? arguments.checkpoint : std::string();
   distributed::State state = distributed::State::from_bytes(
-      processes.of_first(is_first ? first_state(arguments, inputs, options).to_bytes() : std::string()));
+      processes.of_first(is_first ? first_state(arguments, state_file, inputs, options).to_bytes() : std::string()));
   columns.levels = state.levels();
   const RowRange range = rows_of(processes, table.rows(), options.block_rows);
   const int threads = learning.options.max_threads;
   while (!state.finished()) {
     ProgressBar bar(fmt::format("pass {} ({})", state.counts().passes + 1, name_of(state.step())));
-    distributed::Sums all = processes.merged(sum_rows(table, range, columns, state, options.block_rows, threads, bar));
+    distributed::Sums all =
+        processes.merged(sum_rows(table, range, columns, state, state_file, options.block_rows, threads, bar));
     std::string next;
     if (is_first) {
-      next = distributed::advance(state, std::move(all), {}, threads).to_bytes();
+      next = with_state_of(state_file, [&] {
+               return distributed::advance(state, std::move(all), {}, threads);
+             }).to_bytes();
       if (!arguments.checkpoint.empty()) write_file(arguments.checkpoint, next);
     }
-    state = distributed::State::from_bytes(processes.of_first(std::move(next)));
+    state =
+        with_state_of(state_file, [&] { return distributed::State::from_bytes(processes.of_first(std::move(next))); });
   }
   if (!is_first) return;
   if (!arguments.output.empty()) write_file(arguments.output, state.model_json());

@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <cstring>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -169,6 +172,12 @@ void fit_command(FitArguments arguments) {
   if (arguments.output.empty()) print("Not written: give -o FILE.json\n");
 }
 
+// Throws std::runtime_error if there is no such file, or it may not be read.
+void require_readable(const std::string& path) {
+  if (path == "-" || std::ifstream(path)) return;
+  throw std::runtime_error(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
+}
+
 }  // namespace
 
 void add_fit(CLI::App& app) {
@@ -205,10 +214,10 @@ void add_fit(CLI::App& app) {
       return;
     }
     for (const char* option : {"--memory", "--checkpoint", "--resume"}) {
-      if (command->count(option) > 0) {
-        throw std::invalid_argument(fmt::format("{}: {} is for Arrow files, and for several; llmt table makes one",
-                                                arguments->learning.data, option));
-      }
+      if (command->count(option) == 0) continue;
+      require_readable(arguments->learning.data);  // what is not there is no CSV file either
+      throw std::invalid_argument(fmt::format("{}: {} is for Arrow files, and for several; llmt table makes one",
+                                              arguments->learning.data, option));
     }
     require_target(arguments->learning);
     if (arguments->stream) {

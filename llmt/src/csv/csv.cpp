@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 
 #include "base/memory.hpp"
@@ -24,6 +25,24 @@ char separator_of(std::string_view header, DecimalMark mark) {
     if (header.find(candidate) != std::string_view::npos) return candidate;
   }
   return ',';
+}
+
+// Tables of other programs that are no text, by their first bytes.
+void refuse_binary_tables(const std::string& name, std::string_view bytes) {
+  struct Kind {
+    std::string_view begin;
+    const char* what;
+  };
+  static constexpr std::array<Kind, 3> kinds = {Kind{"\xFF\xFF\xFF\xFF", "an Arrow stream"},
+                                                {{"FEA1\0", 5}, "a Feather file of version 1"},
+                                                {"PAR1\x15", "a Parquet file"}};
+  for (const Kind& kind : kinds) {
+    if (!bytes.starts_with(kind.begin)) continue;
+    throw std::runtime_error(
+        fmt::format("{}: this is {}, a table of text or an uncompressed Arrow file is needed; in Python "
+                    "pyarrow.feather.write_feather(table, path, compression=\"uncompressed\") writes one",
+                    name, kind.what));
+  }
 }
 
 }  // namespace
@@ -53,6 +72,7 @@ void Csv::read_header() {
     throw std::runtime_error(fmt::format(
         "{}: this is an Arrow file, a table of text is needed; llmt fit and llmt predict read both", name_));
   }
+  refuse_binary_tables(name_, std::string_view(text_).substr(header_begin_));
   if (header.starts_with("\xFF\xFE") || header.starts_with("\xFE\xFF") || header.find('\0') != std::string_view::npos) {
     throw std::runtime_error(fmt::format("{}: this is UTF-16 or no text at all, UTF-8 is needed", name_));
   }

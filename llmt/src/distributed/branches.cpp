@@ -21,13 +21,18 @@ TrainingData data_of(const StateData& data, const TopNode& node, BranchRows rows
   const Eigen::Index inputs = data.inputs();
   const Eigen::Index columns = data.row_columns();
   const bool is_all = node.rows == data.rows;
+  Eigen::Index given = 0;
+  for (const std::vector<double>& piece : rows.pieces) given += std::ssize(piece) / columns;
+  if (given != node.rows) {
+    throw std::runtime_error(fmt::format(
+        "llmt::distributed::advance: a branch has {} rows, and had {}: the table changed", given, node.rows));
+  }
   result.inputs.resize(node.rows, inputs);
   result.outputs.resize(node.rows, 1);
   if (data.is_weighted()) result.weights.resize(node.rows);
   Eigen::Index next = 0;
   for (std::vector<double>& piece : rows.pieces) {
     const Eigen::Index count = std::ssize(piece) / columns;
-    if (count > node.rows - next) break;
     using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const Eigen::Map<const RowMajorMatrix> values(piece.data(), count, columns);
     result.inputs.middleRows(next, count) = values.leftCols(inputs);
@@ -37,10 +42,6 @@ TrainingData data_of(const StateData& data, const TopNode& node, BranchRows rows
     }
     next += count;
     std::vector<double>().swap(piece);
-  }
-  if (next != node.rows) {
-    throw std::runtime_error(fmt::format(
-        "llmt::distributed::advance: a branch has not the {} rows that it had: the table changed", node.rows));
   }
   result.input_names = to_strings(data.input_names);
   result.output_names = {to_string(data.output_name)};

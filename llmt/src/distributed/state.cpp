@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <new>
 #include <set>
 #include <stdexcept>
 
@@ -300,7 +301,9 @@ State State::from_bytes(std::string_view bytes, const std::string& name) {
     StateData data = llmt::from_bytes<StateData>(content);
     check_state(data);
     return finish_state(std::move(data));
-  } catch (const std::runtime_error& error) {
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {  // an option out of range is the file's, not an argument of the caller
     throw std::runtime_error(fmt::format("{}: {}", name, error.what()));
   }
 }
