@@ -7,69 +7,14 @@
 #include "model_files/model_json.hpp"
 #include "stream/state.hpp"
 #include "stream/stream_archive.hpp"
+#include "stream/stream_links.hpp"
 
 namespace llmt {
-
-// The nodes that a node leads to, as positions in the list of nodes; -1: none. Members of StreamJson capture lists of
-// it.
-struct StreamLinks {
-  int left = -1;
-  int right = -1;
-  int alternate = -1;
-};
 
 namespace {
 
 constexpr const char* stream_format_name = "llmt-stream";
 constexpr int stream_format_version = 1;
-
-// A tree's nodes, every node before those that it leads to.
-std::vector<const StreamNode*> nodes_of(const StreamNode& root) {
-  std::vector<const StreamNode*> nodes = {&root};
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    const StreamNode& node = *nodes[k];
-    for (const StreamNode* below : {node.children[0].get(), node.children[1].get(), node.alternate.get()}) {
-      if (below != nullptr) nodes.push_back(below);
-    }
-  }
-  return nodes;
-}
-
-// The links of nodes in the order of nodes_of().
-std::vector<StreamLinks> links_of(const std::vector<const StreamNode*>& nodes) {
-  std::vector<StreamLinks> links;
-  int next = 1;
-  for (const StreamNode* node : nodes) {
-    StreamLinks& of = links.emplace_back();
-    if (!node->is_leaf()) {
-      of.left = next++;
-      of.right = next++;
-    }
-    if (node->alternate) of.alternate = next++;
-  }
-  return links;
-}
-
-// Puts the nodes into each other; the first one is the root.
-std::unique_ptr<StreamNode> joined(std::vector<std::unique_ptr<StreamNode>> nodes,
-                                   const std::vector<StreamLinks>& links, const JsonReader& json) {
-  const auto take = [&](std::size_t from, int at) {
-    if (static_cast<std::size_t>(at) <= from || at >= std::ssize(nodes) || nodes[at] == nullptr) {
-      json.fail(fmt::format("node {} leads to {}, which is not a later node, or has been led to before", from, at));
-    }
-    return std::move(nodes[at]);
-  };
-  for (std::size_t k = nodes.size(); k-- > 0;) {
-    if (nodes[k] == nullptr) continue;
-    StreamNode& node = *nodes[k];
-    if (links[k].left >= 0) node.children = {take(k, links[k].left), take(k, links[k].right)};
-    if (links[k].alternate >= 0) node.alternate = take(k, links[k].alternate);
-  }
-  for (std::size_t k = 1; k < nodes.size(); ++k) {
-    if (nodes[k] != nullptr) json.fail(fmt::format("no node leads to node {}", k));
-  }
-  return std::move(nodes.front());
-}
 
 // A row as Stream::add() accepts it, of positive weight.
 bool is_row(const std::vector<double>& row, Eigen::Index inputs) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "llmt/limits.hpp"
 #include "llmt/stream.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/stream_data.hpp"
@@ -156,6 +157,34 @@ TEST(StreamJson, ATextThatContradictsItselfIsRefusedWithThePlace) {
   EXPECT_EQ(refusal_with(text, [&](Json& json) { json["version"] = 2; }), "s.json: /version: 2 is not within 1 ... 1");
   EXPECT_EQ(refusal_of_state(llmt::to_json(after(100).snapshot())),
             "s.json: not a stream: \"format\" is not \"llmt-stream\"");
+}
+
+// A chain of splits: the left child is split again.
+TEST(StreamJson, AStreamIsNoDeeperThanAModel) {
+  const Json whole = Json::parse(to_json(after(4000)));
+  Json inner;
+  Json leaf;
+  for (const Json& node : whole["trees"][0]["nodes"]) (node.contains("split") ? inner : leaf) = node;
+  ASSERT_TRUE(inner.contains("split") && leaf.contains("sums"));
+  inner.erase("alternate");
+  for (const char* part : {"alternate", "search"}) leaf.erase(part);
+  const auto chain = [&](int splits) {
+    Json nodes = Json::array();
+    for (int k = 0; k < splits; ++k) {
+      inner["split"]["left"] = 2 * k + 1;
+      inner["split"]["right"] = 2 * k + 2;
+      nodes.push_back(inner);
+      if (k > 0) nodes.push_back(leaf);
+    }
+    nodes.push_back(leaf);
+    nodes.push_back(leaf);
+    Json json = whole;
+    json["trees"][0]["nodes"] = nodes;
+    return json.dump();
+  };
+  const auto most = static_cast<int>(llmt::most(llmt::Limit::model_splits_above_leaf));
+  EXPECT_EQ(refusal_of_state(chain(most)), "nothing was thrown");
+  EXPECT_EQ(refusal_of_state(chain(most + 1)), "s.json: /trees/0/nodes: the tree is deeper than 2000 splits");
 }
 
 TEST(StreamJson, RowsBeforeTheTreesAreCheckedAsRowsThatAreAdded) {
