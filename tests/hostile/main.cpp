@@ -1,6 +1,6 @@
 // hostile_inputs LIST...: runs the programs on inputs that were made to break them, and prints a line per input with
-// its state. LIST: urdf, mechanism, model, name, largest. The exit code is 1 if one of them does not end as the threat
-// model says: by a signal, after 5 s, beyond 1 GiB, or refused without the file's name.
+// its state. LIST: urdf, mechanism, model, name, arrow, state, largest. The exit code is 1 if one of them does not end
+// as the threat model says: by a signal, after 5 s, beyond 1 GiB, or refused without the file's name.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -11,6 +11,8 @@
 
 int main(int argc, char** argv) {
   namespace fs = std::filesystem;
+  if (argc == 3 && std::string_view(argv[1]) == "--stream") return hostile::go_on_from_stream(argv[2]);
+  const std::string self = fs::canonical("/proc/self/exe").string();
   const fs::path folder = fs::temp_directory_path() / fmt::format("llmt_hostile_{}", ::getpid());
   fs::create_directories(folder);
   fs::current_path(folder);
@@ -23,6 +25,8 @@ int main(int argc, char** argv) {
     if (which == "largest") hostile::ask_largest(list, LLMT_PROGRAM, LLMT_ROBOT_PROGRAM);
 #endif
     if (which == "model") hostile::ask_models(list, LLMT_PROGRAM);
+    if (which == "arrow") hostile::ask_arrow_files(list, LLMT_PROGRAM);
+    if (which == "state") hostile::ask_states(list, LLMT_PROGRAM, self);
     if (which == "name") hostile::ask_names(list, LLMT_PROGRAM);
   }
   fs::current_path(fs::temp_directory_path());
