@@ -40,6 +40,16 @@ void warn_if_not_finite(const ExplainArguments& arguments, const char* what, con
 // Sums of trees are explained against the mean over at most this many rows.
 constexpr Eigen::Index most_background = 100;
 
+// What a call on the model says is wrong, with the file's name.
+template <class Call>
+auto with_name(const std::string& path, const Call& call) {
+  try {
+    return call();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: {}", path, error.what()));
+  }
+}
+
 std::string mean_over(Eigen::Index rows) { return fmt::format("on average over {} rows of the table", rows); }
 
 Eigen::Index rows_of_importance(const Model& /*model*/, const Eigen::MatrixXd& inputs, std::string& /*beginning*/) {
@@ -53,10 +63,11 @@ Eigen::Index rows_of_importance(const BoostedModel& /*model*/, const Eigen::Matr
 
 template <class AnyModel>
 void explain_table(const ExplainArguments& arguments, const AnyModel& model, const Eigen::MatrixXd& inputs) {
-  report::TableExplanation explanation{.model = arguments.model,
-                                       .data = arguments.data,
-                                       .rows = inputs.rows(),
-                                       .shares = importance(model, inputs, arguments.threads)};
+  report::TableExplanation explanation{
+      .model = arguments.model,
+      .data = arguments.data,
+      .rows = inputs.rows(),
+      .shares = with_name(arguments.model, [&] { return importance(model, inputs, arguments.threads); })};
   explanation.rows_used = rows_of_importance(model, inputs, explanation.beginning);
   warn_if_not_finite(arguments, "importances", explanation.shares);
   if (arguments.json) {
@@ -92,7 +103,8 @@ void explain_row(const ExplainArguments& arguments, const AnyModel& model, const
                                      csv.line_of(arguments.row - 1),
                                      inputs.row(arguments.row - 1),
                                      {}};
-  explanation.attribution = attribution_of(model, explanation.inputs, inputs, explanation.beginning);
+  explanation.attribution = with_name(
+      arguments.model, [&] { return attribution_of(model, explanation.inputs, inputs, explanation.beginning); });
   warn_if_not_finite(arguments, "contributions", explanation.attribution.contributions);
   if (arguments.json) {
     print_json(report::explanation_json(model, explanation));

@@ -13,7 +13,6 @@
 #include "apps/arrow_limits.hpp"
 #include "apps/programs.hpp"
 #include "apps/robot_limits.hpp"
-#include "llmt/boosted_model.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/distributed.hpp"
 #include "llmt/files.hpp"
@@ -22,6 +21,7 @@
 #include "llmt/model.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "oracles/chains.hpp"
+#include "oracles/hard_sums.hpp"
 
 namespace {
 
@@ -70,16 +70,6 @@ void list_boxes(std::int64_t sides) {
     node.level_side.back() = 1;
   }
   llmt::Model(columns, chain.outputs(), chain.regressors(), {partition}).leaves(0);
-}
-
-void sum_with_slopes(std::int64_t slopes) {
-  llmt::BoostedSum sum;
-  sum.features = {{.first = 0}};
-  llmt::BoostedLeaf leaf;
-  leaf.features.assign(slopes, 0);
-  leaf.slopes.assign(slopes, 1.0);
-  sum.trees = {{.splits = {}, .leaves = {leaf}}};
-  llmt::BoostedModel({{.name = "a", .low = 0.0, .high = 1.0}}, {{.name = "y", .low = 0.0, .high = 1.0}}, {1.0}, {sum});
 }
 
 void run(const Folder& folder, const std::string& command) {
@@ -151,7 +141,10 @@ void ask(Limit limit, double size) {
       list_boxes(count);
       return;
     case Limit::sum_leaf_slopes:
-      sum_with_slopes(count);
+      oracle::leaf_of_slopes(count);
+      return;
+    case Limit::sum_trials_per_leaf:
+      oracle::explain_counting_leaf(count);
       return;
     case Limit::description_bytes:
       llmt::robotics::read_robot(sparse(folder, count));
@@ -239,6 +232,8 @@ std::string refusal(Limit limit) {
       return "too many to be listed";
     case Limit::sum_leaf_slopes:
       return "more than 12 slopes";
+    case Limit::sum_trials_per_leaf:
+      return "more than 4096 trials a leaf";
     case Limit::description_bytes:
       return "it holds more than 16 MiB";
     case Limit::yaml_nodes:
@@ -291,7 +286,9 @@ TEST_P(EachLimit, IsTakenAndOneMoreIsRefused) {
   const double beyond = row.unit == llmt::LimitUnit::power
                             ? std::nextafter(row.most, std::numeric_limits<double>::infinity())
                             : row.most + 1.0;
-  const double smallest_step = row.limit == Limit::listed_sides ? of_a_box : 0.0;
+  const double smallest_step = row.limit == Limit::listed_sides          ? of_a_box
+                               : row.limit == Limit::sum_trials_per_leaf ? 2400.0
+                                                                         : 0.0;
   EXPECT_EQ(message(row.limit, row.most).find(refusal(row.limit)), std::string::npos) << message(row.limit, row.most);
   const std::string refused = message(row.limit, beyond + smallest_step);
   EXPECT_NE(refused.find(refusal(row.limit)), std::string::npos) << refused.substr(0, 300);

@@ -30,12 +30,14 @@ struct Attributions {
 /// sums of those of its trees. Slopes, limits of leaves, soft splits, pairs of inputs and missing values are in it as
 /// in BoostedModel::predict().
 ///
-/// Exact: each tree is walked once for x and b together. An input is taken from x or from b where a split or a leaf
-/// first needs to know; what comes to a leaf with the inputs A from x and B from b is a game
-/// v(S) = value [A in S] [B and S disjoint], whose Shapley values are known. The time grows with the background.
+/// Exact: each tree is walked once for x and b together, and what comes to its leaves is integrated as polynomials
+/// (docs/algorithms/explanation.md). Where pairs of inputs, limits of leaves or a smallest_share do not allow that,
+/// inputs are tried one by one, at most Limit::sum_trials_per_leaf times for each leaf of the tree. The time grows with
+/// the background.
 ///
-/// Throws std::invalid_argument if a number of columns differs, a value is infinite, or there is no background. Same
-/// bytes at any number of threads (0: all). Reports to `progress` after each row of the inputs.
+/// Throws std::invalid_argument if a number of columns differs, a value is infinite, there is no background, or a tree
+/// needs more trials. Same bytes at any number of threads (0: all). Reports to `progress` after each row of the inputs
+/// and within the rows.
 Attributions attribute_rows(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                             const Eigen::Ref<const Eigen::MatrixXd>& background, int max_threads = 0,
                             const Progress& progress = {});

@@ -28,6 +28,7 @@ enum class Limit {
   model_splits_above_leaf,
   listed_sides,
   sum_leaf_slopes,
+  sum_trials_per_leaf,
   description_bytes,
   yaml_nodes,
   expression_characters,
@@ -88,6 +89,9 @@ inline constexpr std::array limit_table = std::to_array<LimitRow>({
     {Limit::listed_sides, "sides and levels of the boxes of all leaves, where they are listed", 100'000'000,
      LimitUnit::count, "refused with the tree's number"},
     {Limit::sum_leaf_slopes, "slopes in a leaf of a sum of trees", 12, LimitUnit::count, "refused with file and place"},
+    // As many as a leaf of 12 slopes at its limits may need.
+    {Limit::sum_trials_per_leaf, "inputs tried from either row to explain a tree of a sum, for each of its leaves",
+     4096, LimitUnit::count, "refused with the tree's place"},
     {Limit::description_bytes, "robot description, mechanism, catalogue, terms", 1 << 24, LimitUnit::bytes, "refused"},
     {Limit::yaml_nodes, "keys, values and lists of a YAML file", 300'000, LimitUnit::count,
      "refused with file and line"},

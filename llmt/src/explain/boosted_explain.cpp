@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "base/checks.hpp"
 #include "base/parallel.hpp"
 #include "explain/tree_game.hpp"
+#include "llmt/limits.hpp"
 
 namespace llmt {
 namespace {
@@ -23,16 +26,47 @@ void check_table(const std::string& function, const std::string& argument, const
   check_finite_or_missing(function.c_str(), argument.c_str(), rows);
 }
 
+// For each tree of each sum, the rule that integrates its games.
+std::vector<std::vector<const GameRule*>> rules_of(const BoostedModel& model, std::map<int, GameRule>& rules) {
+  std::vector<std::vector<const GameRule*>> of_sums;
+  for (const BoostedSum& sum : model.sums()) {
+    std::vector<const GameRule*>& of_trees = of_sums.emplace_back();
+    for (const BoostedTree& tree : sum.trees) {
+      const int order = order_for(tree, sum.features);
+      of_trees.push_back(&rules.try_emplace(order, order).first->second);
+    }
+  }
+  return of_sums;
+}
+
+[[noreturn]] void refuse(std::size_t output, std::size_t tree) {
+  throw std::invalid_argument(fmt::format(
+      "llmt::attribute: sums/{}/trees/{}: more than {} trials a leaf: too many inputs meet in pairs, at the "
+      "limits of a leaf, or at soft splits with a smallest_share",
+      output, tree, most(Limit::sum_trials_per_leaf)));
+}
+
+// Rows of the background that a tree stays in the cache for.
+constexpr Eigen::Index pairs_at_once = 32;
+
 // Contributions of a row, outputs x inputs. `rows_of_background`: a column for each row.
-Eigen::MatrixXd contributions_of(const BoostedModel& model, const Eigen::VectorXd& x,
-                                 const Eigen::MatrixXd& rows_of_background) {
+Eigen::MatrixXd contributions_of(const BoostedModel& model, const std::vector<std::vector<const GameRule*>>& rules,
+                                 const Eigen::VectorXd& x, const Eigen::MatrixXd& rows_of_background, Work& work) {
   Eigen::MatrixXd contributions(model.num_outputs(), model.num_inputs());
   for (std::size_t o = 0; o < model.sums().size(); ++o) {
     const BoostedSum& sum = model.sums()[o];
     Eigen::VectorXd values = Eigen::VectorXd::Zero(model.num_inputs());
-    for (Eigen::Index row = 0; row < rows_of_background.cols(); ++row) {
-      TwoRows rows(model, sum, x.data(), rows_of_background.col(row).data());
-      for (const BoostedTree& tree : sum.trees) rows.add_values(tree, sum.rate, values);
+    for (Eigen::Index first = 0; first < rows_of_background.cols(); first += pairs_at_once) {
+      work.check();
+      std::vector<TwoRows> pairs;
+      for (Eigen::Index row = first; row < std::min(first + pairs_at_once, rows_of_background.cols()); ++row) {
+        pairs.emplace_back(model, sum, x.data(), rows_of_background.col(row).data(), work);
+      }
+      for (std::size_t k = 0; k < sum.trees.size(); ++k) {
+        for (TwoRows& pair : pairs) {
+          if (!pair.add_values(sum.trees[k], *rules[o][k], sum.rate, values)) refuse(o, k);
+        }
+      }
     }
     contributions.row(static_cast<Eigen::Index>(o)) =
         values.transpose() / static_cast<double>(rows_of_background.cols());
@@ -52,9 +86,12 @@ Attributions attribute_rows(const BoostedModel& model, const Eigen::Ref<const Ei
       .reference = model.predict(background, max_threads).colwise().mean().transpose(),
       .contributions = {static_cast<std::size_t>(model.num_outputs()), Eigen::MatrixXd(inputs.rows(), inputs.cols())}};
   const Eigen::MatrixXd rows_of_background = background.transpose();
+  std::map<int, GameRule> by_order;
+  const std::vector<std::vector<const GameRule*>> rules = rules_of(model, by_order);
   Work work(progress);
   parallel_for(inputs.rows(), max_threads, [&](Eigen::Index row) {
-    const Eigen::MatrixXd of_row = contributions_of(model, inputs.row(row).transpose(), rows_of_background);
+    const Eigen::MatrixXd of_row =
+        contributions_of(model, rules, inputs.row(row).transpose(), rows_of_background, work);
     for (Eigen::Index o = 0; o < of_row.rows(); ++o) result.contributions[o].row(row) = of_row.row(o);
     work.did(1.0 / static_cast<double>(inputs.rows()));
   });

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "boosted/model/boosted_checks.hpp"
 #include "boosted/model/transition.hpp"
+#include "llmt/limits.hpp"
+#include "numerics/quadrature.hpp"
 
 namespace llmt {
 namespace {
@@ -12,23 +15,71 @@ namespace {
 // In linear terms a missing value counts as z = 0.
 double in_terms(double z) { return std::isnan(z) ? 0.0 : z; }
 
-// The way of a row at a split. A row that goes both ways has a third one.
-enum class Way { left, right, both };
+// Whether a value lies within the transition of a split.
+bool is_within(const BoostedSplit& split, double z) { return std::abs(z - split.threshold) < split.half_width; }
 
-Way way_of(const BoostedSplit& split, double z) {
-  if (std::isnan(z)) return split.missing_left ? Way::left : Way::right;
-  if (std::abs(z - split.threshold) < split.half_width) return Way::both;
-  return z <= split.threshold ? Way::left : Way::right;
-}
+// A factor so small that a product with it may not be a normal number counts as none.
+double without_dust(double factor) { return factor < 1e-290 ? 0.0 : factor; }
 
 }  // namespace
 
-TwoRows::TwoRows(const BoostedModel& model, const BoostedSum& sum, const double* x, const double* background)
-    : inputs_(model.num_inputs()), changes_(model.num_inputs(), 0.0) {
+int order_for(const BoostedTree& tree, const std::vector<BoostedFeature>& features) {
+  std::vector<int> uses;  // of each input, on the path
+  int inputs = 0;
+  const auto use = [&](int input, int change) {
+    if (input < 0) return;
+    if (std::ssize(uses) <= input) uses.resize(input + 1, 0);
+    inputs += change > 0 ? uses[input] == 0 : -static_cast<int>(uses[input] == 1);
+    uses[input] += change;
+  };
+  const auto use_feature = [&](int feature, int change) {
+    use(features[feature].first, change);
+    use(features[feature].second, change);
+  };
+  int most_inputs = 0;
+  struct Visit {
+    int at;
+    bool is_over;
+  };
+  std::vector<Visit> visits = {{tree.splits.empty() ? -1 : 0, false}};
+  while (!visits.empty()) {
+    const auto [at, is_over] = visits.back();
+    visits.pop_back();
+    if (at < 0) {
+      const std::vector<int>& of_leaf = tree.leaves[-1 - at].features;
+      for (const int feature : of_leaf) use_feature(feature, 1);
+      most_inputs = std::max(most_inputs, inputs);
+      for (const int feature : of_leaf) use_feature(feature, -1);
+      continue;
+    }
+    const BoostedSplit& split = tree.splits[at];
+    use_feature(split.feature, is_over ? -1 : 1);
+    if (is_over) continue;
+    visits.push_back({at, true});
+    visits.push_back({split.left, false});
+    visits.push_back({split.right, false});
+  }
+  return std::max(2, (most_inputs + 3) / 4 * 2);
+}
+
+GameRule::GameRule(int order) {
+  const Quadrature rule = gauss_legendre(order);
+  row = rule.nodes;
+  weights = rule.weights;
+  for (int k = 0; k < order; ++k) {
+    background.push_back(1.0 - row[k]);
+    per_row.push_back(weights[k] / row[k]);
+    per_background.push_back(-weights[k] / background[k]);
+  }
+}
+
+TwoRows::TwoRows(const BoostedModel& model, const BoostedSum& sum, const double* x, const double* background,
+                 Work& work)
+    : work_(work), inputs_(model.num_inputs()), changes_(model.num_inputs(), 0.0) {
   for (Eigen::Index j = 0; j < model.num_inputs(); ++j) {
     const auto z = [&](const double* row) { return (row[j] - model.inputs()[j].centre) / model.deviations()[j]; };
     const bool same = x[j] == background[j] || (std::isnan(x[j]) && std::isnan(background[j]));
-    inputs_[j] = {.standardised = {z(x), z(background)}, .differs = !same, .source = Source::open};
+    inputs_[j] = {.standardised = {z(x), z(background)}, .differs = !same, .is_open = !same, .side = 0, .factors = {}};
   }
   for (const BoostedFeature& feature : sum.features) {
     features_.push_back({.is = feature,
@@ -37,89 +88,243 @@ TwoRows::TwoRows(const BoostedModel& model, const BoostedSum& sum, const double*
   }
 }
 
-void TwoRows::add_values(const BoostedTree& tree, double scale, Eigen::Ref<Eigen::VectorXd> values) {
+bool TwoRows::add_values(const BoostedTree& tree, const GameRule& rule, double scale,
+                         Eigen::Ref<Eigen::VectorXd> values) {
   tree_ = &tree;
+  rule_ = &rule;
   scale_ = scale;
   values_ = values.data();
-  walk(tree.splits.empty() ? -1 : 0, 1.0);
+  half_order_ = rule.row.size() / 2;
+  level_ = 0;
+  levels_.resize(std::max(levels_.size(), 3 * order()));
+  std::fill_n(products(), order(), 1.0);
+  std::fill_n(sums(), order(), 0.0);
+  trials_ = 0;
+  const auto most_trials = most(Limit::sum_trials_per_leaf) * std::ssize(tree.leaves);
+  tasks_.push_back({Task::Kind::go, tree.splits.empty() ? -1 : 0, 1.0, -1, {}});
+  while (!tasks_.empty()) {
+    const Task task = tasks_.back();
+    tasks_.pop_back();
+    if (task.kind == Task::Kind::go_back) {
+      go_back(task.input, task.factors);
+      continue;
+    }
+    if (task.input >= 0) go_to(task.input, task.factors);
+    walk(task.at, task.share);
+    if (trials_ > most_trials) return false;
+    constexpr std::int64_t steps_between_looks = 1024;
+    if (++steps_ % steps_between_looks == 0) work_.check();
+  }
+  return true;
 }
 
 // The feature as the inputs have been decided; an input that is the same in both rows is of either.
 double TwoRows::value(int feature) const {
-  const BoostedFeature& is = features_[feature].is;
-  const auto of_row = [&](int input) { return inputs_[input].source != Source::background; };
-  if (is.second < 0) return value(feature, of_row(is.first));
-  const auto z = [&](int input) { return inputs_[input].standardised[of_row(input) ? 0 : 1]; };
-  return z(is.first) + is.sign * z(is.second);
+  const auto& [is, of] = features_[feature];
+  if (is.second < 0) return of[inputs_[is.first].side];
+  const auto z = [&](const Input& input) { return input.standardised[input.side]; };
+  return z(inputs_[is.first]) + is.sign * z(inputs_[is.second]);
 }
 
-// The first input of the feature that differs and is not decided; -1: none.
-int TwoRows::first_open(int feature) const {
-  const BoostedFeature& is = features_[feature].is;
-  if (is_open(is.first)) return is.first;
-  return is.second >= 0 && is_open(is.second) ? is.second : -1;
+// The open input whose factors changed last.
+int TwoRows::last_open() const {
+  return *std::find_if(touched_.rbegin(), touched_.rend(), [&](int input) { return inputs_[input].is_open; });
 }
 
-// True if both rows go the same way, so that it does not matter from which one the input is taken.
-bool TwoRows::is_same_way(const BoostedSplit& split) const {
-  if (features_[split.feature].is.second >= 0) return false;
-  const Way way = way_of(split, value(split.feature, true));
-  return way != Way::both && way == way_of(split, value(split.feature, false));
+TwoRows::Values TwoRows::values_of_pair(const BoostedFeature& feature) const {
+  const Input& first = inputs_[feature.first];
+  const Input& second = inputs_[feature.second];
+  Values values;
+  for (int i = first.side; i <= (first.is_open ? 1 : first.side); ++i) {
+    for (int j = second.side; j <= (second.is_open ? 1 : second.side); ++j) {
+      values.z[values.count++] = first.standardised[i] + feature.sign * second.standardised[j];
+    }
+  }
+  return values;
+}
+
+// The smallest and the largest share that may come to where the walk is, `share` times the factors so far.
+TwoRows::Range TwoRows::range_of(double share) const {
+  Range range{share, share};
+  for (const int input : touched_) {
+    const Factors& factors = inputs_[input].factors;
+    const double larger = std::max(factors.row, factors.background);
+    range.low *= inputs_[input].is_open ? std::min(factors.row, factors.background) : larger;
+    range.high *= larger;
+  }
+  return range;
+}
+
+// How much of what comes to a split goes to the right. Where that depends on inputs that are open, nothing.
+std::optional<double> TwoRows::right_of(const BoostedSplit& split, double z, double share) const {
+  if (std::isnan(z)) return split.missing_left ? 0.0 : 1.0;
+  const double crisp = z <= split.threshold ? 0.0 : 1.0;
+  if (!is_within(split, z)) return crisp;
+  const double right = share_of_right(z, split.threshold, split.half_width);
+  if (tree_->smallest_share == 0.0) return right;
+  const Range range = range_of(share);
+  if (goes_both_ways(range.low, right, tree_->smallest_share)) return right;
+  if (goes_both_ways(range.high, right, tree_->smallest_share)) return std::nullopt;
+  return crisp;
 }
 
 void TwoRows::walk(int at, double share) {
   while (at >= 0) {
     const BoostedSplit& split = tree_->splits[at];
-    const int open = first_open(split.feature);
-    if (open >= 0 && !is_same_way(split)) {
+    const auto& [is, of] = features_[split.feature];
+    const int open = first_open(is);
+    const Values values = open < 0        ? Values{{value(split.feature)}, 1}
+                          : is.second < 0 ? Values{{of[0], of[1]}, 2}
+                                          : values_of_pair(is);
+    double right[4];
+    int known = 0;
+    bool differ = false;
+    for (int k = 0; k < values.count; ++k) {
+      const std::optional<double> found = right_of(split, values.z[k], share);
+      if (!found) break;
+      right[k] = *found;
+      differ = differ || right[k] != right[0];
+      ++known;
+    }
+    if (known < values.count) {
+      decide(last_open(), at, share);
+    } else if (differ && values.count > 2) {
       decide(open, at, share);
-      return;
-    }
-    const double z = value(split.feature);
-    const Way way = way_of(split, z);
-    if (way == Way::both) {
-      const double right = share_of_right(z, split.threshold, split.half_width);
-      if (goes_both_ways(share, right, tree_->smallest_share)) {
-        walk(split.left, share * (1.0 - right));
-        share *= right;
-        at = split.right;
-        continue;
+    } else if (differ) {
+      at = branch(split, share, open, {.row = right[0], .background = right[1]});
+    } else {
+      if (right[0] != 0.0 && right[0] != 1.0) {
+        tasks_.push_back({Task::Kind::go, split.right, share * right[0], -1, {}});
+        share *= 1.0 - right[0];
       }
+      at = right[0] == 1.0 ? split.right : split.left;
     }
-    at = way == Way::left || (way == Way::both && z <= split.threshold) ? split.left : split.right;
   }
   end_in(tree_->leaves[-1 - at], at, share);
 }
 
-// Goes on from `at` with the input from the one row, then from the other.
-void TwoRows::decide(int input, int at, double share) {
-  inputs_[input].source = Source::row;
-  of_row_.push_back(input);
-  walk(at, share);
-  of_row_.pop_back();
-  inputs_[input].source = Source::background;
-  of_background_.push_back(input);
-  walk(at, share);
-  of_background_.pop_back();
-  inputs_[input].source = Source::open;
+// Goes on to the left of a split with the factors that the input has there, and later to the right. One of the sides
+// may get nothing. Returns where to go on.
+int TwoRows::branch(const BoostedSplit& split, double share, int input, const Factors& right) {
+  const Factors& now = inputs_[input].factors;
+  const auto scaled = [&](double row, double background) {
+    return Factors{.row = without_dust(now.row * row), .background = without_dust(now.background * background)};
+  };
+  const Factors of_left = scaled(1.0 - right.row, 1.0 - right.background);
+  const Factors of_right = scaled(right.row, right.background);
+  const bool is_left = of_left.row != 0.0 || of_left.background != 0.0;
+  if (is_left && (of_right.row != 0.0 || of_right.background != 0.0)) {
+    tasks_.push_back({Task::Kind::go, split.right, share, input, of_right});
+  }
+  go_to(input, is_left ? of_left : of_right);
+  return is_left ? split.left : split.right;
 }
 
-void TwoRows::end_in(const BoostedLeaf& leaf, int at, double share) {
-  double value = 0.0;
-  if (const int input = deciding_input(leaf, value); input >= 0) {
-    decide(input, at, share);
+// Goes on from `at` with the input from the row, and later with it from the background.
+void TwoRows::decide(int input, int at, double share) {
+  ++trials_;
+  const Factors now = inputs_[input].factors;
+  tasks_.push_back({Task::Kind::go, at, share, input, {.row = 0.0, .background = now.background}});
+  go_to(input, {.row = now.row, .background = 0.0});
+}
+
+// With q_i changed to q'_i, what comes to all leaves below adds the integral of its sum times
+// (dq'_i / dp) / q'_i - (dq_i / dp) / q_i to the input's value. For a leaf, the changes on its path add up to the last.
+void TwoRows::go_to(int input, const Factors& factors) {
+  const Factors before = inputs_[input].factors;
+  inputs_[input].set(factors);
+  if (before.are_one()) touched_.push_back(input);
+  tasks_.push_back({Task::Kind::go_back, 0, 0.0, input, before});
+  ++level_;
+  const std::size_t order = this->order();
+  if (levels_.size() < 3 * order * (level_ + 1)) levels_.resize(2 * levels_.size() + 3 * order);
+  const double* const p = rule_->row.data();
+  const double* const rest = rule_->background.data();
+  const double* const above = products() - 3 * order;
+  double* const __restrict product = products();
+  double* const __restrict weight = weights();
+  double* const __restrict sum = sums();
+  if (before.are_one() && (factors.row == 0.0 || factors.background == 0.0)) {  // as at crisp splits: no divisions
+    const bool of_row = factors.row != 0.0;
+    const double factor = of_row ? factors.row : factors.background;
+    const double* const q = of_row ? p : rest;
+    const double* const of_rule = of_row ? rule_->per_row.data() : rule_->per_background.data();
+    for (std::size_t k = 0; k < order; ++k) {
+      product[k] = above[k] * (factor * q[k]);
+      weight[k] = of_rule[k];
+      sum[k] = 0.0;
+    }
     return;
   }
-  add(share * std::clamp(value, leaf.low, leaf.high));
-  // Within the limits the leaf is a sum of games in which one more input is of the row.
-  for (const int input : changing_) add(share * changes_[input], input);
+  for (std::size_t k = 0; k < order; ++k) {
+    const double q_before = before.row * p[k] + before.background * rest[k];
+    const double q = factors.row * p[k] + factors.background * rest[k];
+    product[k] = above[k] * (q / q_before);
+    sum[k] = 0.0;
+    weight[k] =
+        rule_->weights[k] * ((factors.row - factors.background) / q - (before.row - before.background) / q_before);
+  }
+}
+
+void TwoRows::go_back(int input, const Factors& factors) {
+  const std::size_t order = this->order();
+  const double* const sum = sums();
+  const double* const weight = weights();
+  double* const __restrict above = sums() - 3 * order;
+  double value = 0.0;
+  for (std::size_t k = 0; k < order; ++k) value += weight[k] * sum[k];
+  for (std::size_t k = 0; k < order; ++k) above[k] += sum[k];
+  values_[input] += value;
+  inputs_[input].set(factors);
+  if (factors.are_one()) touched_.pop_back();
+  --level_;
+}
+
+// A leaf within its limits is linear: its value if all open inputs are of the background, and a change for each of them
+// that is of the row.
+void TwoRows::end_in(const BoostedLeaf& leaf, int at, double share) {
+  double value = 0.0;
+  for (int input = deciding_input(leaf, value); input >= 0; input = deciding_input(leaf, value)) {
+    decide(input, at, share);
+  }
+  const std::size_t order = this->order();
+  const double* const p = rule_->row.data();
+  const double* const product = products();
+  double* const __restrict sum = sums();
+  const double whole = scale_ * share;
+  double integral = 0.0;  // of the product alone, which inputs have that no split has asked for
+  for (std::size_t k = 0; k < order; ++k) integral += rule_->weights[k] * product[k];
+  double slope = 0.0;  // of the leaf's value by p, from these inputs
+  for (const int input : changing_) {
+    const Factors& factors = inputs_[input].factors;
+    const double change = whole * changes_[input];
+    if (factors.are_one()) {
+      values_[input] += change * integral;
+      slope += change;
+      continue;
+    }
+    double of_input = 0.0;
+    for (std::size_t k = 0; k < order; ++k) {
+      const double q = factors.row * p[k] + factors.background * rule_->background[k];
+      const double of_row = change * product[k] * (factors.row / q);
+      sum[k] += of_row * p[k];
+      of_input += rule_->weights[k] * of_row * (factors.background / q);
+    }
+    values_[input] += of_input;
+  }
+  const double constant = whole * std::clamp(value, leaf.low, leaf.high);
+  for (std::size_t k = 0; k < order; ++k) sum[k] += product[k] * (constant + slope * p[k]);
+}
+
+void TwoRows::forget_changes() {
+  for (const int input : changing_) changes_[input] = 0.0;
+  changing_.clear();
 }
 
 // The leaf's `value` with all open inputs from the background, and what each of them changes if it is from the row
 // (changes_). An input to decide, if the leaf may reach its limits or is not a sum of what the inputs change; else -1.
 int TwoRows::deciding_input(const BoostedLeaf& leaf, double& value) {
-  for (const int input : changing_) changes_[input] = 0.0;
-  changing_.clear();
+  forget_changes();
   const auto change = [&](int input, double by) {
     if (std::ranges::find(changing_, input) == changing_.end()) changing_.push_back(input);
     changes_[input] += by;
@@ -127,27 +332,26 @@ int TwoRows::deciding_input(const BoostedLeaf& leaf, double& value) {
   value = leaf.constant;
   for (std::size_t k = 0; k < leaf.features.size(); ++k) {
     const int feature = leaf.features[k];
-    const int open = first_open(feature);
-    const BoostedFeature& is = features_[feature].is;
+    const auto& [is, of] = features_[feature];
+    const int open = first_open(is);
     if (open < 0) {
       value += leaf.slopes[k] * in_terms(this->value(feature));
       continue;
     }
     if (is.second < 0) {
-      const double from = in_terms(this->value(feature, false));
+      const double from = in_terms(of[1]);
       value += leaf.slopes[k] * from;
-      change(open, leaf.slopes[k] * (in_terms(this->value(feature, true)) - from));
+      change(open, leaf.slopes[k] * (in_terms(of[0]) - from));
       continue;
     }
     double sum = 0.0;
     for (const int input : {is.first, is.second}) {
-      const Input& of = inputs_[input];
+      const auto& [z, differs, is_open, side, factors] = inputs_[input];
       const double factor = input == is.first ? 1.0 : is.sign;
-      const bool is_undecided = is_open(input);
-      sum += factor * of.standardised[is_undecided || of.source == Source::background ? 1 : 0];
-      const double by = factor * (of.standardised[0] - of.standardised[1]);
-      if (is_undecided && std::isnan(by)) return input;  // missing in one row: the pair is no sum
-      if (is_undecided) change(input, leaf.slopes[k] * by);
+      sum += factor * z[is_open ? 1 : side];
+      const double by = factor * (z[0] - z[1]);
+      if (is_open && std::isnan(by)) return input;  // missing in one row: the pair is no sum
+      if (is_open) change(input, leaf.slopes[k] * by);
     }
     if (std::isnan(sum)) return open;
     value += leaf.slopes[k] * sum;
@@ -155,22 +359,14 @@ int TwoRows::deciding_input(const BoostedLeaf& leaf, double& value) {
   double low = value;
   double high = value;
   for (const int input : changing_) (changes_[input] < 0.0 ? low : high) += changes_[input];
+  if (low >= leaf.high || high <= leaf.low) {  // the limit, whatever the inputs
+    value = low >= leaf.high ? leaf.high : leaf.low;
+    forget_changes();
+  }
   const bool is_within = low >= leaf.low && high <= leaf.high;
-  return is_within || changing_.empty() ? -1 : changing_.front();
-}
-
-// The game v(S) = value [A in S] [B and S disjoint], with A the inputs of the row, and `more`, and B those of the
-// background: an input of A gets value (a - 1)! b! / (a + b)!, one of B -value a! (b - 1)! / (a + b)!.
-void TwoRows::add(double value, int more) {
-  const auto a = static_cast<double>(of_row_.size() + (more >= 0 ? 1 : 0));
-  const auto b = static_cast<double>(of_background_.size());
-  if (a + b == 0.0) return;
-  double orders = 1.0;  // (a + b)! / (a! b!)
-  for (double k = 1.0; k <= std::min(a, b); k += 1.0) orders *= (std::max(a, b) + k) / k;
-  const double each = scale_ * value / orders;
-  for (const int input : of_row_) values_[input] += each / a;
-  if (more >= 0) values_[more] += each / a;
-  for (const int input : of_background_) values_[input] -= each / b;
+  return is_within || changing_.empty()
+             ? -1
+             : *std::ranges::max_element(changing_, {}, [&](int input) { return std::abs(changes_[input]); });
 }
 
 }  // namespace llmt

@@ -6,9 +6,7 @@
 #include <numbers>
 
 namespace llmt {
-namespace {
-
-// Gauss-Legendre of a given order: zeros of the Legendre polynomial by Newton's method.
+// The zeros of the Legendre polynomial, by Newton's method.
 Quadrature gauss_legendre(int order) {
   Quadrature rule;
   for (int i = 1; i <= order; ++i) {
@@ -30,6 +28,8 @@ Quadrature gauss_legendre(int order) {
   }
   return rule;
 }
+
+namespace {
 
 constexpr int highest_order = 16;
 

@@ -1,7 +1,6 @@
 // Contributions to predictions of sums of trees, against the definition of Shapley values.
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -10,43 +9,12 @@
 
 #include "llmt/boosted.hpp"
 #include "llmt/boosted_explain.hpp"
+#include "oracles/coalitions.hpp"
 #include "oracles/random_boosted.hpp"
 
 namespace {
 
 constexpr double no_limit = 1e6;
-
-double factorial(int n) { return std::tgamma(n + 1.0); }
-
-// From the values of all 2^n coalitions: phi_i = sum over S without i of |S|! (n - |S| - 1)! / n! (v(S + i) - v(S)).
-Eigen::VectorXd shapley(const Eigen::VectorXd& v, int n) {
-  Eigen::VectorXd phi = Eigen::VectorXd::Zero(n);
-  for (unsigned s = 0; s < (1U << n); ++s) {
-    const int size = std::popcount(s);
-    for (int i = 0; i < n; ++i) {
-      if ((s >> i & 1U) != 0U) continue;
-      phi(i) += factorial(size) * factorial(n - size - 1) / factorial(n) * (v(s | 1U << i) - v(s));
-    }
-  }
-  return phi;
-}
-
-// The same by predictions of rows whose inputs are mixed.
-Eigen::MatrixXd by_brute_force(const llmt::BoostedModel& model, const Eigen::VectorXd& x,
-                               const Eigen::MatrixXd& background) {
-  const int n = static_cast<int>(model.num_inputs());
-  Eigen::MatrixXd v = Eigen::MatrixXd::Zero(1 << n, model.num_outputs());
-  for (unsigned s = 0; s < (1U << n); ++s) {
-    Eigen::MatrixXd mixed = background;
-    for (int i = 0; i < n; ++i) {
-      if ((s >> i & 1U) != 0U) mixed.col(i).setConstant(x(i));
-    }
-    v.row(s) = model.predict(mixed).colwise().mean();
-  }
-  Eigen::MatrixXd phi(model.num_outputs(), n);
-  for (Eigen::Index o = 0; o < model.num_outputs(); ++o) phi.row(o) = shapley(v.col(o), n).transpose();
-  return phi;
-}
 
 TEST(BoostedAttribution, IsTheShapleyValueOfEveryInput) {
   const std::vector<random_boosted::Kind> kinds = {{.soft = false, .limit = no_limit},
@@ -62,7 +30,7 @@ TEST(BoostedAttribution, IsTheShapleyValueOfEveryInput) {
     double largest = 0.0;
     for (Eigen::Index row = 0; row < x.rows(); ++row) {
       const Eigen::VectorXd point = x.row(row).transpose();
-      const Eigen::MatrixXd expected = by_brute_force(model, point, background);
+      const Eigen::MatrixXd expected = oracle::by_all_coalitions(model, point, background);
       const Eigen::MatrixXd found = llmt::attribute(model, point, background).contributions;
       EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 1e-11) << "kind " << k << ", row " << row;
       largest = std::max(largest, expected.cwiseAbs().maxCoeff());

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "llmt/limits.hpp"
+
 namespace llmt {
 namespace {
 
@@ -37,6 +39,9 @@ void check_columns(const std::vector<InputColumn>& inputs, const std::vector<Out
     if (!std::isfinite(deviation) || deviation <= 0.0) fail(pointer, "deviation is not a positive number");
     if (!inputs[j].codes.empty()) fail(pointer, "a boosted model has no codes");
     const std::vector<std::string>& levels = inputs[j].levels;
+    if (std::ssize(levels) > most(Limit::categories)) {
+      fail(pointer, fmt::format("{} levels, at most {} are possible", levels.size(), most(Limit::categories)));
+    }
     if (std::set<std::string>(levels.begin(), levels.end()).size() != levels.size()) {
       fail(pointer, "two levels have one name");
     }
@@ -86,6 +91,7 @@ void check_tree(const BoostedTree& tree, std::size_t features, const std::string
   }
   std::vector<bool> split_seen(tree.splits.size(), false);
   std::vector<bool> leaf_seen(tree.leaves.size(), false);
+  std::vector<int> splits_above(tree.splits.size(), 0);
   for (std::size_t k = 0; k < tree.splits.size(); ++k) {
     const BoostedSplit& split = tree.splits[k];
     const std::string of_split = fmt::format("{}/splits/{}", pointer, k);
@@ -101,6 +107,10 @@ void check_tree(const BoostedTree& tree, std::size_t features, const std::string
       if (at >= seen.size() || (!is_leaf && at <= k)) fail(of_split, fmt::format("{} is no child", child));
       if (seen[at]) fail(of_split, fmt::format("{} is the child of two", child));
       seen[at] = true;
+      if (splits_above[k] + 1 > most(Limit::model_splits_above_leaf)) {
+        fail(of_split, fmt::format("the tree is deeper than {} splits", most(Limit::model_splits_above_leaf)));
+      }
+      if (!is_leaf) splits_above[at] = splits_above[k] + 1;
     }
   }
   for (std::size_t k = 0; k < tree.leaves.size(); ++k) {

@@ -18,6 +18,7 @@
 namespace llmt {
 namespace {
 
+// Calls itself at soft splits only, so no deeper than Limit::model_splits_above_leaf.
 double value_below(const BoostedTree& tree, const double* z, int at, double share) {
   double sum = 0.0;
   while (at >= 0) {
