@@ -254,6 +254,38 @@ def test_ctrl_c_ends_a_fit():
     assert output == "interrupted 0\n"
 
 
+# One row against 1000 others: 300 leaves at whose limits 12 inputs meet, which are tried some 1000 times for each of them.
+EXPLAINED = """
+import json, sys, threading, numpy as np, llmt
+n = 12
+leaf = [0.0, -0.01, 0.01] + [number for j in range(n) for number in (j, 1.0 if j % 2 else -1.0)]
+inputs = [{"name": f"i{j}", "low": 0.0, "high": 1.0, "centre": 0.5, "deviation": 0.3} for j in range(n)]
+model = {"format": "llmt-boosted-model", "version": 1, "inputs": inputs,
+         "outputs": [{"name": "y", "low": 0.0, "high": 1.0}],
+         "sums": [{"base": 0.5, "rate": 0.1, "features": [{"column": j} for j in range(n)],
+                   "trees": [{"splits": [], "leaves": [leaf]}] * 300}]}
+open(sys.argv[1], "w").write(json.dumps(model))
+X = np.random.default_rng(0).uniform(size=(1000, n))
+print("ready", flush=True)
+try:
+    llmt.load(sys.argv[1]).explain(X[:1], X)
+except KeyboardInterrupt:
+    print("interrupted", sum(t.name != "MainThread" for t in threading.enumerate()), flush=True)
+"""
+
+
+def test_ctrl_c_ends_an_explanation_of_one_row(tmp_path):
+    command = [sys.executable, "-c", EXPLAINED, str(tmp_path / "m.json")]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert child.stdout.readline() == "ready\n"
+    time.sleep(0.5)
+    sent = time.monotonic()
+    child.send_signal(signal.SIGINT)
+    assert child.stdout.readline() == "interrupted 0\n"
+    print(f"interrupted after {time.monotonic() - sent:.2f} s")
+    assert child.wait(timeout=60) == 0
+
+
 def test_progress_is_reported():
     from llmt import _core
 

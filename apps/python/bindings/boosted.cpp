@@ -26,9 +26,6 @@
 namespace llmt::python {
 namespace {
 
-// Explained at a time; signals are looked for in between.
-constexpr Eigen::Index explained_by_sum = 20;
-
 std::unique_ptr<BoostResult> boost_table(const Array& inputs, const Array& outputs, const Options& options,
                                          std::vector<std::string> input_names, std::vector<std::string> output_names,
                                          std::vector<std::vector<std::string>> levels,
@@ -74,18 +71,14 @@ auto extrapolation_of_sum(const BoostedModel& self, const Array& inputs) {
 
 // Contributions of all rows, one matrix (rows x inputs) for each output, and the mean prediction of the background.
 auto attribute_to_sum(const BoostedModel& self, const Array& inputs, const Array& background, int threads) {
+  const Eigen::MatrixXd rows = rows_of(inputs);
   const Eigen::MatrixXd compared = rows_of(background);
-  std::vector<Eigen::MatrixXd> contributions(
-      self.num_outputs(), Eigen::MatrixXd(static_cast<Eigen::Index>(inputs.shape(0)), self.num_inputs()));
-  Eigen::VectorXd reference;
-  for_blocks(inputs, explained_by_sum, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
-    const Attributions found = attribute_rows(self, block, compared, threads);
-    reference = found.reference;
-    for (std::size_t o = 0; o < contributions.size(); ++o) {
-      contributions[o].middleRows(first, block.rows()) = found.contributions[o];
-    }
-  });
-  return std::make_tuple(arrays_of(std::move(contributions)), std::vector<double>(reference.begin(), reference.end()));
+  Attributions found;
+  interruptible([&](const Progress& progress) { found = attribute_rows(self, rows, compared, threads, progress); },
+                nb::none());
+  const Eigen::VectorXd& reference = found.reference;
+  return std::make_tuple(arrays_of(std::move(found.contributions)),
+                         std::vector<double>(reference.begin(), reference.end()));
 }
 
 auto importance_in_sum(const BoostedModel& self, const Array& inputs, int threads) {
