@@ -14,6 +14,7 @@ void ask_arrow_files(List& list, const std::string& program);
 void ask_states(List& list, const std::string& program, const std::string& self);
 int go_on_from_stream(const std::string& file);
 
+void ask_sums(List& list, const std::string& program);
 void ask_names(List& list, const std::string& program);
 
 /// Measures the largest inputs that are permitted, without limits.
