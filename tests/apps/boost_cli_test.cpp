@@ -113,22 +113,65 @@ TEST(BoostProgram, InspectsASum) {
   EXPECT_EQ(all["sums"][0]["splits"], size.leaves - size.trees);
 }
 
+// Inputs of d.csv, colours as the model numbers them.
+Eigen::MatrixXd inputs_of(const Folder& folder) {
+  const llmt::Csv csv = llmt::Csv::read(folder.file("d.csv"));
+  Eigen::MatrixXd inputs(csv.rows(), 2);
+  inputs.col(0) = csv.numbers_or_missing(std::vector<std::string>{"a"});
+  const std::vector<std::string> colours = csv.texts("colour");
+  for (std::size_t i = 0; i < colours.size(); ++i) inputs(static_cast<int>(i), 1) = colours[i] == "red" ? 1.0 : 0.0;
+  return inputs;
+}
+
+// The Shapley values of both inputs by their definition: what an input changes if it comes first and if it comes
+// second, each half, where inputs that have not come are those of the background.
+Eigen::Vector2d shapley(const llmt::BoostedModel& model, const Eigen::RowVector2d& row,
+                        const Eigen::MatrixXd& background) {
+  const auto value = [&](bool with_a, bool with_colour) {
+    Eigen::MatrixXd mixed = background;
+    if (with_a) mixed.col(0).setConstant(row(0));
+    if (with_colour) mixed.col(1).setConstant(row(1));
+    return model.predict(mixed).mean();
+  };
+  const double none = value(false, false);
+  const double a = value(true, false);
+  const double colour = value(false, true);
+  const double both = value(true, true);
+  return {(a - none + both - colour) / 2.0, (colour - none + both - a) / 2.0};
+}
+
 TEST(BoostProgram, ExplainsRowsAndTables) {
   const Folder folder;
   ASSERT_NO_FATAL_FAILURE(fit_sum(folder, 150));
+  const llmt::BoostedModel model = llmt::load_boosted(folder.file("m.json"));
+  const Eigen::MatrixXd inputs = inputs_of(folder);
+  const auto evenly_spaced = [&](int count) {
+    Eigen::MatrixXd rows(count, 2);
+    for (int k = 0; k < count; ++k) rows.row(k) = inputs.row(k * 150 / count);
+    return rows;
+  };
   const Outcome of_row = folder.run(LLMT_PROGRAM " explain m.json d.csv --row 2 --json");
   ASSERT_EQ(of_row.exit_code, 0) << of_row.err;
   const json target = json::parse(of_row.out)["targets"][0];
-  double sum = target["reference"];
-  for (const json& entry : target["contributions"]) sum += entry["contribution"].get<double>();
-  EXPECT_NEAR(sum, target["prediction"].get<double>(), 1e-12);
+  EXPECT_NEAR(target["prediction"].get<double>(), model.predict(inputs.row(1))(0), 1e-12);
+  EXPECT_NEAR(target["reference"].get<double>(), model.predict(evenly_spaced(100)).mean(), 1e-12);
+  const Eigen::Vector2d expected = shapley(model, inputs.row(1), evenly_spaced(100));
+  EXPECT_GT(expected.cwiseAbs().minCoeff(), 0.05) << "would prove little";
+  ASSERT_EQ(target["contributions"].size(), 2);
+  for (const json& entry : target["contributions"]) {
+    EXPECT_NEAR(entry["contribution"].get<double>(), expected(entry["input"] == "a" ? 0 : 1), 1e-11) << entry;
+  }
   const Outcome text = folder.run(LLMT_PROGRAM " explain m.json d.csv --row 2");
   EXPECT_NE(text.out.find("on average over 100 rows of the table"), std::string::npos) << text.out;
   const json table = json::parse(folder.run(LLMT_PROGRAM " explain m.json d.csv --json").out);
   EXPECT_EQ(table["rows_used"], 150);
-  double shares = 0.0;
-  for (const json& entry : table["targets"][0]["importance"]) shares += entry["importance"].get<double>();
-  EXPECT_NEAR(shares, 1.0, 1e-12);
+  Eigen::Vector2d shares = Eigen::Vector2d::Zero();
+  for (int i = 0; i < 150; ++i) shares += shapley(model, inputs.row(i), evenly_spaced(20)).cwiseAbs();
+  shares /= shares.sum();
+  ASSERT_EQ(table["targets"][0]["importance"].size(), 2);
+  for (const json& entry : table["targets"][0]["importance"]) {
+    EXPECT_NEAR(entry["importance"].get<double>(), shares(entry["input"] == "a" ? 0 : 1), 1e-11) << entry;
+  }
 }
 
 TEST(BoostProgram, IsComparedWithOneTree) {

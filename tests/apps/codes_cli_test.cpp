@@ -15,9 +15,10 @@ using program::Folder;
 using program::llmt_program;
 using program::Outcome;
 
+constexpr double of_side[] = {0.0, 2.0, -1.5, 1.0, -2.0, 1.5, -0.5, 0.8};
+
 // 240 rows. `side` is 1 ... 8, also written 1.0 or 1e0; its effect has no order.
 std::string coded_table() {
-  const double of_side[] = {0.0, 2.0, -1.5, 1.0, -2.0, 1.5, -0.5, 0.8};
   const char* endings[] = {"", ".0", "e0"};
   llmt::Random random(1);
   std::string text = "side,a,b,y\n";
@@ -50,11 +51,22 @@ TEST(Codes, AreFoundToldAndPredictedByNumber) {
   EXPECT_EQ(answer["unknown_categories"], 0);
   EXPECT_EQ(answer["missing_values"], 1);
   const std::vector<double> y = answer["targets"][0]["predicted"];
-  EXPECT_NEAR(y[0], -1.5 + 2.0 * std::sin(1.0), 0.3);
   for (const int same : {1, 2, 3}) EXPECT_EQ(y[same], y[0]);
   EXPECT_EQ(y[4], y[5]);
   const std::string text = folder.run(llmt_program + " predict m.json q.csv").err;
   EXPECT_NE(text.find("2 codes that were not in training, taken as the nearest"), std::string::npos) << text;
+
+  // Each side has 30 rows with a noise of 0.2: its mean is known to 0.037.
+  std::string sides = "side,a,b\n";
+  for (int side = 1; side <= 8; ++side) sides += fmt::format("{},0.5,0\n{},-0.3,0.5\n", side, side);
+  folder.write("sides.csv", sides);
+  const Outcome of_sides = folder.run(llmt_program + " predict m.json sides.csv");
+  const Eigen::VectorXd found = llmt::Csv::parse(of_sides.out, "sides").numbers("y_pred");
+  ASSERT_EQ(found.size(), 16) << of_sides.err;
+  for (int k = 0; k < 8; ++k) {
+    EXPECT_NEAR(found(2 * k), of_side[k] + 2.0 * std::sin(1.0), 0.12) << k;
+    EXPECT_NEAR(found(2 * k + 1), of_side[k] - 2.0 * std::sin(0.6) + 0.25, 0.12) << k;
+  }
 }
 
 TEST(Codes, AreExplainedAndInspected) {

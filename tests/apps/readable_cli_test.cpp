@@ -2,6 +2,7 @@
 // own, which knows rules and equations and nothing of models.
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <cctype>
 #include <cmath>
 #include <map>
@@ -26,8 +27,8 @@ struct Row {
 };
 
 // 400 rows: y bends in a, has a product for green rows, and does not depend on e.
-std::vector<Row> rows() {
-  llmt::Random random(21);
+std::vector<Row> rows(std::uint64_t seed = 21) {
+  llmt::Random random(seed);
   const std::vector<std::string> colours = {"red", "green", "blue"};
   std::vector<Row> result(400);
   for (std::size_t i = 0; i < result.size(); ++i) {
@@ -207,6 +208,32 @@ TEST(ReadableProgram, WhatIsPrintedIsWhatIsPredicted) {
   }
 }
 
+// The numbers in the line of `text` that begins so.
+std::vector<double> figures_behind(const std::string& begin, const std::string& text) {
+  const std::size_t at = text.find("\n" + begin);
+  if (at == std::string::npos) return {};
+  std::istringstream line(text.substr(at + 1 + begin.size(), text.find('\n', at + 1) - at - 1 - begin.size()));
+  std::vector<double> figures;
+  for (double figure = 0.0; line >> figure;) figures.push_back(figure);
+  return figures;
+}
+
+Eigen::MatrixXd regressors_of(const std::vector<Row>& rows) {
+  Eigen::MatrixXd result(rows.size(), 6);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const std::string& colour = rows[i].words.at("colour");
+    result.row(static_cast<int>(i)) << 1.0, rows[i].numbers.at("a"), rows[i].numbers.at("b"), rows[i].numbers.at("e"),
+        colour == "red", colour == "green";
+  }
+  return result;
+}
+
+Eigen::VectorXd outputs_of(const std::vector<Row>& rows) {
+  Eigen::VectorXd result(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) result(static_cast<int>(i)) = rows[i].numbers.at("y");
+  return result;
+}
+
 TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
   const Folder folder;
   folder.write("d.csv", text_of(rows()));
@@ -216,6 +243,27 @@ TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
        {"readable", "least squares", "at most 15 % above that of the best crisp tree", "m.readable.json"}) {
     EXPECT_NE(fitted.out.find(text), std::string::npos) << fitted.out;
   }
+  // Held-out errors are those of rows that the fit has not seen, here by the printed rules and by least squares.
+  const PrintedRules rules(folder.run(llmt_program + " inspect m.readable.json --rules").out);
+  const std::vector<Row> learned = rows();
+  const std::vector<Row> fresh = rows(22);
+  const Eigen::VectorXd plane = regressors_of(learned).colPivHouseholderQr().solve(outputs_of(learned));
+  Eigen::VectorXd of_rules(400);
+  for (int i = 0; i < 400; ++i) of_rules(i) = rules(fresh[i]);
+  const auto rmse = [&](const Eigen::VectorXd& predicted) {
+    return std::sqrt((predicted - outputs_of(fresh)).squaredNorm() / 400.0);
+  };
+  const std::vector<double> readable = figures_behind("        readable ", fitted.out);
+  const std::vector<double> linear = figures_behind("        least squares ", fitted.out);
+  ASSERT_EQ(readable.size(), 5) << fitted.out;  // leaves, terms of a leaf, size, held-out RMSE and its spread
+  EXPECT_EQ(readable[0], static_cast<double>(rules.count()));
+  EXPECT_NEAR(readable[3] / rmse(of_rules), 1.0, 0.25);
+  ASSERT_EQ(linear.size(), 5) << fitted.out;
+  EXPECT_EQ(linear[0], 1.0);
+  EXPECT_NEAR(linear[3] / rmse(regressors_of(fresh) * plane), 1.0, 0.05);
+  const std::vector<double> crisp = figures_behind("  against  crisp tree ", fitted.out);
+  ASSERT_GE(crisp.size(), 2) << fitted.out;
+  EXPECT_LE(readable[3], 1.15 * crisp[1]);
   EXPECT_EQ(folder.run(llmt_program + " predict m.readable.json d.csv --interval 0.9").exit_code, 0);
   EXPECT_EQ(folder.run(llmt_program + " explain m.readable.json d.csv").exit_code, 0);
   const Outcome leaves = folder.run(llmt_program + " inspect m.readable.json");

@@ -92,9 +92,24 @@ TEST(Mimics, AColumnThatContradictsThemIsRefused) {
 }
 
 TEST(Mimics, NeedLimitsWithACommonValue) {
-  Chain chain = arm().chain;
-  chain.joints[joint_index(chain, "rod")].limits = {100.0, 200.0};
-  EXPECT_THROW(validate(chain), std::invalid_argument);
+  // The upper arm's -34.38 ... 80.21 deg put the rod, at -upper + 5.73 deg, between -74.48 and 40.11 deg.
+  const auto said_with = [](double low, double high) {
+    Chain chain = arm().chain;
+    chain.joints[joint_index(chain, "rod")].limits = {low, high};
+    try {
+      validate(chain);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string none =
+      "llmt::robotics::Chain: the limits of upper and of the joints that mimic it have no value in common";
+  EXPECT_EQ(said_with(100.0, 200.0), none);
+  EXPECT_EQ(said_with(40.2, 200.0), none);
+  EXPECT_EQ(said_with(40.0, 200.0), "");
+  EXPECT_EQ(said_with(-200.0, -74.4), "");
+  EXPECT_EQ(said_with(-200.0, -74.6), none);
 }
 
 TEST(Mimics, AreKeptBySearchesOfJointValues) {
