@@ -8,7 +8,7 @@ import re
 LIBRARIES = ("llmt", "robotics")
 MEASURED = (*LIBRARIES, "apps")  # programs, reports and the Python package have rooms as the libraries have
 
-_COMMENT_OR_TEXT = re.compile(
+COMMENT_OR_TEXT = re.compile(
     r"""//[^\n]* | /\*.*?\*/ | R"(?P<mark>[^(\s]*)\(.*?\)(?P=mark)" | "(?:\\.|[^"\\\n])*" |
         (?<![0-9a-fA-F])'(?:\\.|[^'\\\n])'""",
     re.S | re.X)
@@ -45,7 +45,7 @@ class Checkout:
             lines = "\n" * match.group().count("\n")
             return lines if match.group().startswith("/") else '""' + lines
 
-        return _COMMENT_OR_TEXT.sub(blank, self.text(path))
+        return COMMENT_OR_TEXT.sub(blank, self.text(path))
 
     # All nodes of the syntax tree of a file of Python, its module first.
     @functools.lru_cache(maxsize=None)
