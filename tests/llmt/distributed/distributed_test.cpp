@@ -239,6 +239,18 @@ TEST(DistributedTest, AffineRowsAreOneLeafOfLeastSquares) {
   EXPECT_NEAR(slope_of(3), expected(3), 1e-8);
   EXPECT_EQ(leaf.rank, 4);
   EXPECT_NEAR(state.model().predict(table.inputs)(5, 0), (a.row(5) * expected)(0), 1e-6);
+  // What standard errors and leverages are made of.
+  const std::vector<Regressor>& regressors = state.model().regressors();
+  std::vector<Eigen::Index> varying = {0};
+  Eigen::MatrixXd deviations = Eigen::MatrixXd::Ones(table.output.size(), 4);
+  for (std::size_t r = 0; r < regressors.size(); ++r) {
+    if (regressors[r].input == 2) continue;  // is constant
+    deviations.col(std::ssize(varying)) = table.inputs.col(regressors[r].input).array() - regressors[r].centre;
+    varying.push_back(1 + static_cast<Eigen::Index>(r));
+  }
+  ASSERT_EQ(varying.size(), 4U);
+  const Eigen::Matrix4d inverse = (deviations.transpose() * deviations).inverse();
+  EXPECT_LT((leaf.inverse_gram(varying, varying) - inverse).norm(), 1e-9 * inverse.norm());
 }
 
 TEST(DistributedTest, WhatIsMissingOrDoesNotFitIsNamed) {

@@ -294,6 +294,15 @@ TEST(Stream, RefusalsNameTheRow) {
   EXPECT_NE(message([] { Stream(1, 1, {.bins = 3}); }).find("bins is 3, it must be within 4 ... 256"),
             std::string::npos);
   EXPECT_NE(message([] { Stream(1, 1, {.max_leaves = -1}); }).find("max_leaves is -1"), std::string::npos);
+  const double infinite = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(message([] { Stream(1, 1, {.min_variance_gain = -0.1}); }),
+            "llmt::Stream: StreamOptions::min_variance_gain is -0.1, it must be finite and not negative");
+  EXPECT_NE(message([&] { Stream(1, 1, {.min_variance_gain = infinite}); }).find("gain is inf"), std::string::npos);
+  EXPECT_NE(message([] { Stream(1, 1, {.min_leaf_samples = -1}); }).find("min_leaf_samples is -1"), std::string::npos);
+  EXPECT_NE(message([] { Stream(1, 1, {.bins = 257}); }).find("bins is 257"), std::string::npos);
+  EXPECT_NE(message([] { Stream(1, 1, {.shrinkage = -1.0}); }).find("shrinkage is -1"), std::string::npos);
+  EXPECT_NE(message([] { Stream(1, 1, {.reservoir_rows = -1}); }).find("reservoir_rows is -1"), std::string::npos);
+  EXPECT_EQ(message([] { Stream(1, 1, {.min_variance_gain = 0.0, .bins = 256, .shrinkage = 0.05}); }), "");
 }
 
 }  // namespace
