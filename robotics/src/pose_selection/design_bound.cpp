@@ -73,7 +73,7 @@ IdealDesign ideal_design(const DesignProblem& problem, const Eigen::MatrixXd& ro
   design.weights = Eigen::VectorXd(design.weights(kept));
   design.weights /= design.weights.sum();
   for (int round = 0; round < rounds; ++round) {
-    improve(problem, rows_of(rows, kept), count, steps_of_few, design);
+    improve(problem, rows_of_poses(rows, kept), count, steps_of_few, design);
     const Eigen::VectorXd slope = sensitivities(design, rows);
     if (is_near(design, count, slope.maxCoeff(), 1.0)) break;
     Eigen::VectorXd missing = slope;

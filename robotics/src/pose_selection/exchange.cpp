@@ -103,7 +103,7 @@ class Neighbours {
 
 }  // namespace
 
-Eigen::MatrixXd rows_of(const Eigen::MatrixXd& rows, const std::vector<Eigen::Index>& poses) {
+Eigen::MatrixXd rows_of_poses(const Eigen::MatrixXd& rows, const std::vector<Eigen::Index>& poses) {
   Eigen::MatrixXd result(3 * std::ssize(poses), rows.cols());
   for (std::size_t i = 0; i < poses.size(); ++i) result.middleRows(3 * i, 3) = rows.middleRows(3 * poses[i], 3);
   return result;

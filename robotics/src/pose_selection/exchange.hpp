@@ -17,7 +17,7 @@ struct DesignProblem {
 };
 
 /// The rows of the poses of those numbers.
-Eigen::MatrixXd rows_of(const Eigen::MatrixXd& rows, const std::vector<Eigen::Index>& poses);
+Eigen::MatrixXd rows_of_poses(const Eigen::MatrixXd& rows, const std::vector<Eigen::Index>& poses);
 
 /// The sum of J'J over the poses of those numbers.
 Eigen::MatrixXd information(const Eigen::MatrixXd& rows, const std::vector<Eigen::Index>& poses);

@@ -196,7 +196,7 @@ PredictedCalibration median_of_random(const Task& task, const Eigen::MatrixXd& r
   for (int draw = 0; draw < draws; ++draw) {
     std::vector<Eigen::Index> order = random.permutation(rows.rows() / 3);
     order.resize(task.options.count);
-    drawn.push_back(predict(task, rows_of(rows, order)));
+    drawn.push_back(predict(task, rows_of_poses(rows, order)));
   }
   std::ranges::sort(drawn, {}, &PredictedCalibration::position_mm);
   return drawn[draws / 2];
