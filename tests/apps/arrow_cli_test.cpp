@@ -7,7 +7,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/arrow.hpp"
 #include "llmt/files.hpp"
 #include "llmt/random.hpp"
@@ -18,7 +18,7 @@ namespace {
 using program::Folder;
 using program::Outcome;
 
-const std::string llmt_program = LLMT_PROGRAM;
+using program::llmt_program;
 
 // Rows of a kink.
 std::string rows_of(int first, int count) {
@@ -145,7 +145,7 @@ TEST(ArrowProgram, AStateThatIsWrongIsNamed) {
   const Folder folder;
   folder.write("d.csv", rows_of(0, 3000));
   ASSERT_EQ(folder.run(llmt_program + " table d.csv -o d.arrow").exit_code, 0);
-  const std::string fit = llmt_program + " fit d.arrow -t y --memory 100K --checkpoint ";
+  const std::string fit = llmt_program + " fit d.arrow -t y --memory 100K --cv 0 --checkpoint ";
   const std::vector<std::string> states = state_files::split(folder.run(fit + "/dev/stdout | cat").out);
   ASSERT_GE(states.size(), 3);
   for (std::size_t k = 0; k < states.size(); ++k) {

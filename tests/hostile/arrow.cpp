@@ -36,13 +36,13 @@ std::vector<std::string> many_columns(int count) {
 
 // The file with a number of its metadata that is replaced.
 template <class T>
-std::string with(std::string file, std::size_t at, T value) {
+std::string with_number(std::string file, std::size_t at, T value) {
   arrow_edit::set(file, at, value);
   return file;
 }
 
 // Bytes and numbers are replaced, or the end is cut off.
-std::string changed(std::string file, llmt::Random& random) {
+std::string changed_file(std::string file, llmt::Random& random) {
   const auto below = [&](std::size_t count) { return random.below(count); };
   constexpr std::array<std::int64_t, 10> numbers = {0,
                                                     1,
@@ -102,11 +102,11 @@ void ask_arrow_files(List& list, const std::string& program) {
   const std::size_t buffers = arrow_edit::vector(good, batch, 2);
   constexpr std::int64_t huge = std::numeric_limits<std::int64_t>::max();
   for (const std::int64_t rows : {std::int64_t{0}, std::int64_t{-1}, std::int64_t{301}, std::int64_t{100000}, huge}) {
-    std::string file = with(good, arrow_edit::field(good, batch, 0), rows);
+    std::string file = with_number(good, arrow_edit::field(good, batch, 0), rows);
     for (std::size_t column = 0; column < 3; ++column) arrow_edit::set(file, nodes + 16 * column, rows);
     ask(fmt::format("{} rows in a batch of 300", rows), file);
     for (std::size_t column = 0; column < 3; ++column) {
-      file = with(file, arrow_edit::column_field(file, column, 2), std::uint8_t{6});
+      file = with_number(file, arrow_edit::column_field(file, column, 2), std::uint8_t{6});
     }
     ask(fmt::format("{} rows of bits", rows), file);
   }
@@ -117,14 +117,14 @@ void ask_arrow_files(List& list, const std::string& program) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t place = entry + (k == 1 ? 8 : 8 * k);
       ask(fmt::format("entry of a batch, number {} is {}", k, value),
-          k == 1 ? with(good, place, static_cast<std::int32_t>(value)) : with(good, place, value));
+          k == 1 ? with_number(good, place, static_cast<std::int32_t>(value)) : with_number(good, place, value));
     }
-    ask(fmt::format("a buffer begins at {}", value), with(good, buffers + 16, value));
-    ask(fmt::format("a buffer has {} bytes", value), with(good, buffers + 24, value));
-    ask(fmt::format("{} values are missing", value), with(good, nodes + 8, value));
+    ask(fmt::format("a buffer begins at {}", value), with_number(good, buffers + 16, value));
+    ask(fmt::format("a buffer has {} bytes", value), with_number(good, buffers + 24, value));
+    ask(fmt::format("{} values are missing", value), with_number(good, nodes + 8, value));
   }
   for (const std::int32_t length : {-1, 0, 8, (1 << 28) + 1, std::numeric_limits<std::int32_t>::max()}) {
-    ask(fmt::format("a footer of {} bytes", length), with(good, arrow_edit::footer_length(good), length));
+    ask(fmt::format("a footer of {} bytes", length), with_number(good, arrow_edit::footer_length(good), length));
   }
   for (const std::string& begin : {std::string("\xFF\xFF\xFF\xFF\x78\0\0\0", 8), std::string("FEA1\0\0\0\0", 8),
                                    std::string("PAR1\x15\x04"), std::string("ARROW1\0\0", 8), std::string("ARROW1")}) {
@@ -138,7 +138,7 @@ void ask_arrow_files(List& list, const std::string& program) {
   const std::array<std::string, 4> bases = {good, arrow_files::words(), arrow_files::numbers(),
                                             arrow_edit::with_repeated_batch(good, 1)};
   for (int k = 0; k < 400; ++k) {
-    const std::string bytes = changed(bases[static_cast<std::size_t>(k) % bases.size()], random);
+    const std::string bytes = changed_file(bases[static_cast<std::size_t>(k) % bases.size()], random);
     write("evil.arrow", bytes);
     const auto& [use, command] = uses[random.below(uses.size())];
     list.ask(fmt::format("changed bytes {}: {}", k, use), command, "evil.arrow");

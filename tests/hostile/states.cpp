@@ -30,7 +30,7 @@ std::string table(int rows) {
 }
 
 // Words of eight bytes are replaced, bits flipped, bytes left out or repeated.
-std::string changed(std::string content, llmt::Random& random) {
+std::string changed_content(std::string content, llmt::Random& random) {
   const std::array<std::uint64_t, 12> words = {0,
                                                1,
                                                2,
@@ -62,12 +62,13 @@ void ask_fits(List& list, const std::string& program) {
   if (run({program, "table", "d.csv", "-o", "d.arrow"}, {}).exit_code != 0) throw std::runtime_error("no table");
   // Blocks of rows are fewer where a fit may take less memory, so that both have states of all kinds.
   for (const char* memory : {"100K", "4M"}) {
-    const std::vector<std::string> fit = {program, "fit", "d.arrow", "-t", "y", "--memory", memory, "--threads", "1"};
+    const std::vector<std::string> fit = {program, "fit",  "d.arrow", "-t",        "y", "--memory",
+                                          memory,  "--cv", "0",       "--threads", "1"};
     std::vector<std::string> resume = fit;
     resume.insert(resume.end(), {"--checkpoint", "evil.state", "--resume"});
     // Each pass writes a state to a pipe, one behind the other.
     const std::string command =
-        fmt::format("{} fit d.arrow -t y --memory {} --checkpoint /dev/stdout | cat", program, memory);
+        fmt::format("{} fit d.arrow -t y --memory {} --cv 0 --checkpoint /dev/stdout | cat", program, memory);
     const Outcome passes = run({"/bin/sh", "-c", command}, {.seconds = 60.0});
     const std::vector<std::string> states = state_files::split(passes.out);
     if (states.size() < 2) throw std::runtime_error("no states: " + passes.err);
@@ -77,7 +78,8 @@ void ask_fits(List& list, const std::string& program) {
       list.ask(fmt::format("{}: state {} of {}", memory, k + 1, states.size()), resume, "evil.state");
       const int count = static_cast<int>(300 / states.size());
       for (int each = 0; each < count; ++each) {
-        write("evil.state", state_files::sealed_as(states[k], changed(state_files::content(states[k]), random)));
+        write("evil.state",
+              state_files::sealed_as(states[k], changed_content(state_files::content(states[k]), random)));
         list.ask(fmt::format("{}: state {}, change {}", memory, k + 1, each), resume, "evil.state");
       }
     }
