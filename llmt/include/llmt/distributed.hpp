@@ -54,7 +54,8 @@ struct Rows {
   Eigen::Ref<const Eigen::MatrixXd> inputs;  ///< rows x inputs, finite; NaN: missing, see advance()
   Eigen::Ref<const Eigen::VectorXd> output;  ///< one a row, finite
   Eigen::Index first_block = 0;
-  /// One a row, not negative, if Options::weighted says so; as TrainingData::weights: a row of weight 0 takes no part.
+  /// One a row, from 0 to 1e150, if Options::weighted says so. As TrainingData::weights: a row of weight 0 takes no
+  /// part.
   Eigen::VectorXd weights = {};
 };
 

@@ -122,7 +122,8 @@ class Model {
   /// Standard errors of the local models' means, rows x outputs: the square root of the validity-weighted mean of
   /// s_i^2 a' (sum validity a a')^-1 a, s_i^2 = (rss_i + 10 s^2) / (samples_i - rank_i + 10) drawn towards the residual
   /// variance s^2 of all rows. They take the tree as given and the noise as equal within a leaf, say nothing of bias
-  /// and are too small; for intervals that hold what they promise see Intervals. Throws as predict().
+  /// and are too small; for intervals that hold what they promise see Intervals. Infinite where the square of a
+  /// deviation is beyond doubles. Throws as predict().
   Eigen::MatrixXd standard_errors(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
   /// The leaves of a partition from left to right in the tree. Throws std::invalid_argument if there is no such

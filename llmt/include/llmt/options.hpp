@@ -18,7 +18,7 @@
 
 namespace llmt {
 
-/// Inputs and outputs beyond this magnitude are refused, so that squares stay finite; weights of a stream too.
+/// Inputs, outputs and weights beyond this magnitude are refused, so that squares stay finite.
 inline constexpr double largest_magnitude = bound(Limit::magnitude);
 /// With quadratic local models: squares of products of inputs stay finite.
 inline constexpr double largest_factor = bound(Limit::quadratic_magnitude);

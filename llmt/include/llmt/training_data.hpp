@@ -25,7 +25,7 @@ namespace llmt {
 struct TrainingData {
   Eigen::MatrixXd inputs = {};   ///< rows x inputs; NaN: missing
   Eigen::MatrixXd outputs = {};  ///< rows x outputs
-  /// One a row, not negative; a row of weight 0 takes no part. Empty: all 1. If all are whole numbers, at most 10 on
+  /// One a row, from 0 to 1e150; a row of weight 0 takes no part. Empty: all 1. If all are whole numbers, at most 10 on
   /// average over those that are not 0, they are counts: a row of weight k is k equal rows, to the last byte of the
   /// result. Of other weights only the ratios matter (docs/algorithms/data.md).
   Eigen::VectorXd weights = {};

@@ -11,6 +11,7 @@
 
 #include "base/checks.hpp"
 #include "data/regressors.hpp"
+#include "data/row_weight.hpp"
 
 namespace llmt {
 namespace {
@@ -97,8 +98,10 @@ void check_weights(const Eigen::VectorXd& weights, Eigen::Index rows) {
     throw std::invalid_argument(
         fmt::format("llmt::fit: weights has {} entries, inputs has {} rows", weights.size(), rows));
   }
-  check_finite("llmt::fit", "weights", weights);
-  require(weights.minCoeff() >= 0.0, "a weight", weights.minCoeff(), "at least 0");
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    if (is_row_weight(weights(row))) continue;
+    require(false, fmt::format("weights({}), counted from 0,", row).c_str(), weights(row), words_of_row_weight);
+  }
   require(weights.maxCoeff() > 0.0, "the largest weight", weights.maxCoeff(), "positive");
 }
 

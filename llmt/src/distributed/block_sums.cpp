@@ -10,6 +10,7 @@
 
 #include "base/parallel.hpp"
 #include "data/row_hash.hpp"
+#include "data/row_weight.hpp"
 #include "stream/sums.hpp"
 
 namespace llmt::distributed {
@@ -55,8 +56,8 @@ void check_value(const StateData& data, double value, Eigen::Index row, Eigen::I
 }
 
 void check_weight(double weight, Eigen::Index row) {
-  if (weight >= 0.0 && weight <= largest_magnitude) return;
-  refuse(fmt::format("row {}: the weight is {}, it must be from 0 to {:g}", row, weight, largest_magnitude));
+  if (is_row_weight(weight)) return;
+  refuse(fmt::format("row {}: the weight is {}, it must be {}", row, weight, words_of_row_weight));
 }
 
 Sample sample_of(const StateData& data, const Block& block) {

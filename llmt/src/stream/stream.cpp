@@ -8,6 +8,7 @@
 
 #include "base/checks.hpp"
 #include "base/memory.hpp"
+#include "data/row_weight.hpp"
 #include "data/table.hpp"
 #include "fit/plan/memory.hpp"
 #include "llmt/option_fields.hpp"
@@ -87,9 +88,7 @@ void check_rows(const StreamState& state, const Eigen::Ref<const Eigen::MatrixXd
         refuse("outputs", o, outputs(i, o), "finite and at most 1e150 in magnitude");
       }
     }
-    if (weights.size() > 0 && !(weights(i) >= 0.0 && std::isfinite(weights(i)))) {
-      refuse("weights", 0, weights(i), "finite and not negative");
-    }
+    if (weights.size() > 0 && !is_row_weight(weights(i))) refuse("weights", 0, weights(i), words_of_row_weight);
   }
 }
 

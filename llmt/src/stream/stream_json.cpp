@@ -20,10 +20,7 @@ constexpr int stream_format_version = 1;
 bool is_row(const std::vector<double>& row, Eigen::Index inputs) {
   for (Eigen::Index k = 0; k < std::ssize(row); ++k) {
     const bool is_missing = k < inputs && std::isnan(row[k]);
-    if (!is_missing &&
-        !(std::abs(row[k]) <= (k + 1 < std::ssize(row) ? largest_magnitude : std::numeric_limits<double>::max()))) {
-      return false;
-    }
+    if (!is_missing && !(std::abs(row[k]) <= largest_magnitude)) return false;
   }
   return row.back() > 0.0;
 }

@@ -164,12 +164,12 @@ TEST(TrainingData, MistakesAreNamedBeforeTheFit) {
               data.weights.setOnes(20);
               data.weights(7) = nan;
             }),
-            "llmt::fit: weights(7, 0) is nan, it must be finite (rows and columns counted from 0)");
+            "llmt::fit: weights(7), counted from 0, is nan, it must be from 0 to 1e150");
   EXPECT_EQ(refused([](TrainingData& data) {
               data.weights.setOnes(20);
               data.weights(7) = -2.0;
             }),
-            "llmt::fit: a weight is -2, it must be at least 0");
+            "llmt::fit: weights(7), counted from 0, is -2, it must be from 0 to 1e150");
   EXPECT_EQ(refused([](TrainingData& data) { data.groups.assign(21, 1.0); }),
             "llmt::fit: groups has 21 entries, inputs has 20 rows");
   EXPECT_EQ(refused([](TrainingData& data) {

@@ -66,7 +66,7 @@ TEST(Fit, MistakesInWeightsCategoriesAndBlendsAreNamed) {
             "llmt::fit: a category of input 1 is 1.5, it must be a whole number from 0 to 9999");
   EXPECT_EQ(refused({.categorical_inputs = {2}}), "llmt::fit: categorical_inputs names column 2, there are 2");
   EXPECT_EQ(refused({.weights = Eigen::VectorXd::Constant(20, -1.0)}),
-            "llmt::fit: a weight is -1, it must be at least 0");
+            "llmt::fit: weights(0), counted from 0, is -1, it must be from 0 to 1e150");
   EXPECT_EQ(refused({.weights = Eigen::VectorXd::Zero(20)}), "llmt::fit: the largest weight is 0, it must be positive");
   EXPECT_EQ(refused({.weights = Eigen::VectorXd::Ones(19)}), "llmt::fit: weights has 19 entries, inputs has 20 rows");
   EXPECT_EQ(refused({.groups = {1.0, 2.0}}), "llmt::fit: groups has 2 entries, inputs has 20 rows");
