@@ -6,6 +6,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <memory>
+#include <mutex>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -183,37 +184,61 @@ std::tuple<std::vector<Eigen::Index>, double, bool> dominant(const Vector& outpu
   return {found.rows, found.share, found.hide_the_others};
 }
 
+// A stream that threads of the interpreter may share: one call after the other. Nobody waits for another thread with
+// the interpreter's lock in hand, which that thread may need.
+class SharedStream {
+ public:
+  explicit SharedStream(Stream stream) : stream_(std::move(stream)) {}
+
+  template <class Work>
+  auto use(const Work& work) {
+    const nb::gil_scoped_release unlocked;
+    const std::lock_guard lock(mutex_);
+    return work(stream_);
+  }
+
+  // As if `other` were taken at this moment; it may be this one.
+  void merge_with(SharedStream& other) {
+    const std::string given = other.use([](const Stream& stream) { return to_json(stream); });
+    // A merge that fails leaves the stream as it was.
+    use([&](Stream& stream) { stream = merge(stream_from_json(to_json(stream)), stream_from_json(given)); });
+  }
+
+ private:
+  std::mutex mutex_;
+  Stream stream_;
+};
+
 void add_stream(nb::module_& module) {
-  nb::class_<Stream>(module, "Stream", "A tree that learns from rows as they come.")
-      .def(nb::new_([](Eigen::Index inputs, Eigen::Index outputs, const Options& options) {
-        return Stream(inputs, outputs, stream_options(options_of(options)));
-      }))
-      .def_static("from_json", [](const std::string& text) { return stream_from_json(text); })
-      .def("to_json", [](const Stream& self) { return to_json(self); })
+  nb::class_<SharedStream>(module, "Stream", "A tree that learns from rows as they come.")
+      .def("__init__",
+           [](SharedStream* self, Eigen::Index inputs, Eigen::Index outputs, const Options& options) {
+             new (self) SharedStream(Stream(inputs, outputs, stream_options(options_of(options))));
+           })
+      .def_static("from_json",
+                  [](const std::string& text) { return std::make_unique<SharedStream>(stream_from_json(text)); })
+      .def("to_json", [](SharedStream& self) { return self.use([](const Stream& stream) { return to_json(stream); }); })
       .def(
           "add",
-          [](Stream& self, const Array& inputs, const Array& outputs, const std::optional<Vector>& weights) {
+          [](SharedStream& self, const Array& inputs, const Array& outputs, const std::optional<Vector>& weights) {
             const Eigen::MatrixXd x = rows_of(inputs);
             const Eigen::MatrixXd y = rows_of(outputs);
             const Eigen::VectorXd w = weights ? vector_of(*weights) : Eigen::VectorXd();
-            const nb::gil_scoped_release unlocked;
-            self.add(x, y, w);
+            self.use([&](Stream& stream) { stream.add(x, y, w); });
           },
           nb::arg("inputs"), nb::arg("outputs"), nb::arg("weights") = nb::none())
-      .def("merge",
-           [](Stream& self, const Stream& other) {
-             const auto copy_of = [](const Stream& stream) { return stream_from_json(to_json(stream)); };
-             self = merge(copy_of(self), copy_of(other));
-           })
-      .def("rows", [](const Stream& self) { return self.counts().rows; })
+      .def("merge", &SharedStream::merge_with)
+      .def("rows", [](SharedStream& self) { return self.use([](const Stream& s) { return s.counts().rows; }); })
       .def("prequential_rmse",
-           [](const Stream& self) {
-             const Eigen::VectorXd rmse = self.prequential_rmse();
+           [](SharedStream& self) {
+             const Eigen::VectorXd rmse = self.use([](const Stream& stream) { return stream.prequential_rmse(); });
              return std::vector<double>(rmse.begin(), rmse.end());
            })
-      .def("model", [](const Stream& self, const std::vector<std::string>& inputs,
+      .def("model", [](SharedStream& self, const std::vector<std::string>& inputs,
                        const std::vector<std::string>& outputs, const std::string& validity) {
-        return to_json(self.snapshot(parse<ValidityChoice>(validity)).named(inputs, outputs));
+        return self.use([&](const Stream& stream) {
+          return to_json(stream.snapshot(parse<ValidityChoice>(validity)).named(inputs, outputs));
+        });
       });
 }
 

@@ -11,6 +11,7 @@ NB_MODULE(_core, module) {
   module.doc() = "The C++ library, bound. The classes of the package llmt are what people use.";
   module.attr("__version__") = LLMT_VERSION;
   module.attr("most_categories") = llmt::most_categories;
+  module.attr("largest_magnitude") = llmt::largest_magnitude;
   llmt::python::register_errors();
   module.def("looks_for_signals", &llmt::python::looks_for_signals,
              "How often long calls have looked whether Ctrl-C was pressed.");

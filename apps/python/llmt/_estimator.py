@@ -181,34 +181,37 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         ValueError
             For rows that cannot be learned from, and for any other parameter whose value is not its default.
         """
-        stream: StreamModel | None = getattr(self, "_stream", None)
-        if stream is not None:
-            table = read_table(X, levels=self._levels, fitted_names=self._fitted_names())
-        else:
-            table = read_table(X)
-        outputs, names = read_targets(y)
-        check_rows(len(table.values), len(outputs))
-        for name, levels in zip(names_of(table), table.levels, strict=True):
-            if levels:
-                raise ValueError(f'column "{name}" has words; partial_fit learns from numbers')
-        self._refuse_others("is not for streams")
-        options = self._options()
-        if stream is None:
-            self._remember_columns(table)
-            self._is_flat = outputs.ndim == 1
-            self.n_outputs_ = 1 if outputs.ndim == 1 else outputs.shape[1]
-            self._inputs = names_of(table)
-            self._outputs = names or target_names(self.n_outputs_)
-            self._levels = table.levels
-            stream = self._stream = StreamModel(self.n_features_in_, self.n_outputs_, options)
-        elif stream.options and {**options, "validity": ""} != {**stream.options, "validity": ""}:
-            raise ValueError("parameters have changed since the first partial_fit; a clone of the estimator begins anew")
-        outputs = outputs.reshape(len(outputs), -1)
-        if outputs.shape[1] != self.n_outputs_:
-            raise ValueError(f"y has {outputs.shape[1]} targets, the rows before had {self.n_outputs_}")
-        stream.handle.add(table.values, outputs, weights_of(sample_weight, len(outputs)))
-        self._sample = spread(table.values, 500)
-        self._take_stream(stream)
+        with self._learning():
+            stream: StreamModel | None = getattr(self, "_stream", None)
+            if stream is not None:
+                table = read_table(X, levels=self._levels, fitted_names=self._fitted_names())
+            else:
+                table = read_table(X)
+            outputs, names = read_targets(y)
+            check_rows(len(table.values), len(outputs))
+            for name, levels in zip(names_of(table), table.levels, strict=True):
+                if levels:
+                    raise ValueError(f'column "{name}" has words; partial_fit learns from numbers')
+            self._refuse_others("is not for streams")
+            options = self._options()
+            if stream is None:
+                self._remember_columns(table)
+                self._is_flat = outputs.ndim == 1
+                self.n_outputs_ = 1 if outputs.ndim == 1 else outputs.shape[1]
+                self._inputs = names_of(table)
+                self._outputs = names or target_names(self.n_outputs_)
+                self._levels = table.levels
+                stream = self._stream = StreamModel(self.n_features_in_, self.n_outputs_, options)
+            elif stream.options and {**options, "validity": ""} != {**stream.options, "validity": ""}:
+                raise ValueError(
+                    "parameters have changed since the first partial_fit; a clone of the estimator begins anew"
+                )
+            outputs = outputs.reshape(len(outputs), -1)
+            if outputs.shape[1] != self.n_outputs_:
+                raise ValueError(f"y has {outputs.shape[1]} targets, the rows before had {self.n_outputs_}")
+            stream.handle.add(table.values, outputs, weights_of(sample_weight, len(outputs)))
+            self._sample = spread(table.values, 500)
+            self._take_stream(stream)
         return self
 
     def merge(self, other: "LocalLinearTreeRegressor") -> "LocalLinearTreeRegressor":
@@ -217,16 +220,18 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         Both must have learned from the same columns with the same parameters. Shards of a table are so learned apart,
         by any number of processes, and merged in pairs.
         """
-        own: StreamModel | None = getattr(self, "_stream", None)
-        given: StreamModel | None = getattr(other, "_stream", None)
-        if own is None or given is None:
-            raise ValueError("merge needs two estimators that have learned by partial_fit")
-        if self._inputs != other._inputs or self._outputs != other._outputs:
-            raise ValueError(
-                f"columns {self._inputs} and targets {self._outputs} do not go with {other._inputs} and {other._outputs}"
-            )
-        own.handle.merge(given.handle)
-        self._take_stream(own)
+        with self._learning():
+            own: StreamModel | None = getattr(self, "_stream", None)
+            given: StreamModel | None = getattr(other, "_stream", None)
+            if own is None or given is None:
+                raise ValueError("merge needs two estimators that have learned by partial_fit")
+            if self._inputs != other._inputs or self._outputs != other._outputs:
+                raise ValueError(
+                    f"columns {self._inputs} and targets {self._outputs} do not go with {other._inputs} and "
+                    f"{other._outputs}"
+                )
+            own.handle.merge(given.handle)
+            self._take_stream(own)
         return self
 
     def _take_stream(self, stream: StreamModel) -> None:

@@ -110,15 +110,35 @@ class BoostedModel(TextModel):
 
 
 class StreamModel:
-    """A tree that learns from rows as they come. Its state is JSON text when it is pickled."""
+    """A tree that learns from rows as they come. Its state is JSON text when it is pickled.
+
+    Threads may share it: the C++ object takes one call after the other.
+    """
+
+    _text: str | None = None  # of a copy() whose C++ object nobody has asked for
 
     def __init__(self, inputs: int, outputs: int, options: dict[str, Any]) -> None:
-        self.handle = _core.Stream(inputs, outputs, options)
+        self._handle = _core.Stream(inputs, outputs, options)
         self.options = options
 
+    @property
+    def handle(self) -> Any:
+        """The C++ object."""
+        if "_handle" not in self.__dict__:  # of two threads that make it, both take the one that came first
+            self.__dict__.setdefault("_handle", _core.Stream.from_json(self._text))
+        return self._handle
+
+    def copy(self) -> "StreamModel":
+        """The stream as it is now, which learns nothing of what this one learns later."""
+        copy = StreamModel.__new__(StreamModel)
+        copy._text = self.handle.to_json()
+        copy.options = self.options
+        return copy
+
     def __getstate__(self) -> dict[str, Any]:
-        return {"text": self.handle.to_json(), "options": self.options}
+        text = self._text if "_handle" not in self.__dict__ else self._handle.to_json()
+        return {"text": text, "options": self.options}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.handle = _core.Stream.from_json(state["text"])
+        self._handle = _core.Stream.from_json(state["text"])
         self.options = state.get("options", {})

@@ -1,13 +1,14 @@
 """What the estimators share: tables in, predictions out, model files."""
 
 import os
+import threading
 import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from . import _advice
+from . import _advice, _core
 from ._base import BaseEstimator, NotFittedError, RegressorMixin
 from ._model import TextModel
 from .tables import Table, read_column, read_table, read_targets, row_labels
@@ -66,9 +67,10 @@ class TableRegressor(RegressorMixin, BaseEstimator):
         ValueError, TypeError
             For what cannot be learned from; the message names the column or the parameter.
         """
-        rows = self._read_rows(X, y, sample_weight, groups, eval_set)
-        self._learn(rows)
-        self._take_rows(rows)
+        with self._learning():
+            rows = self._read_rows(X, y, sample_weight, groups, eval_set)
+            self._learn(rows)
+            self._take_rows(rows)
         return self
 
     def predict(self, X: Any) -> np.ndarray:
@@ -128,7 +130,11 @@ class TableRegressor(RegressorMixin, BaseEstimator):
         return estimator
 
     def __getstate__(self) -> dict[str, Any]:
-        state = dict(super().__getstate__())
+        with self._learning():
+            state = dict(super().__getstate__())
+            if state.get("_stream") is not None:
+                state["_stream"] = state["_stream"].copy()  # of the same moment as model_
+        del state["_lock"]
         if "_fit" in state:
             state["_fit"] = None
         return state
@@ -143,6 +149,10 @@ class TableRegressor(RegressorMixin, BaseEstimator):
         tags.input_tags.string = True
         tags.target_tags.multi_output = True
         return tags
+
+    def _learning(self) -> Any:
+        """The lock of what changes the estimator: threads that share it learn one after the other."""
+        return self.__dict__.setdefault("_lock", threading.RLock())
 
     def _learn(self, rows: "FitRows") -> None:
         """Makes model_ and summary_ of the rows, and keeps the fit."""
@@ -268,8 +278,11 @@ def weights_of(sample_weight: Any, rows: int) -> np.ndarray | None:
         raise ValueError("Sample weights must be 1D array or scalar")
     if len(weights) != rows:
         raise ValueError(f"sample_weight.shape == {weights.shape}, expected {(rows,)}!")
-    if not np.isfinite(weights).all() or (weights < 0).any():
-        raise ValueError("sample_weight: weights must be finite and not negative")
+    wrong = ~((weights >= 0) & (weights <= _core.largest_magnitude))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        bound = f"from 0 to {_core.largest_magnitude:g}"
+        raise ValueError(f"sample_weight of row {row} is {weights[row]:g}, it must be {bound}")
     if not weights.any():
         raise ValueError("sample_weight: all weights are zero")
     return weights

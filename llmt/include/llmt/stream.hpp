@@ -35,6 +35,9 @@ class StreamState;
 ///
 /// Inputs may be missing (NaN): such a row follows the side with more rows and counts in a local model with the leaf's
 /// mean. Inputs are numbers; categories are not supported.
+///
+/// Threads: members that are const, and to_json(), may be called on several threads at a time. add(), merge() and
+/// assignment need the stream for themselves: who shares a stream that learns holds a lock around every call.
 class Stream {
  public:
   /// Throws std::invalid_argument naming field, value and bound if there is no input or output, or an option is out of
@@ -45,9 +48,10 @@ class Stream {
   Stream(Stream&&) noexcept;
   Stream& operator=(Stream&&) noexcept;
 
-  /// Learns from rows in their order. inputs: rows x inputs; outputs: rows x outputs; weights: one per row, not
-  /// negative, or empty. Throws std::invalid_argument, and learns nothing, if a shape differs, an input is infinite, an
-  /// output or weight is not finite or a weight is negative, naming the row of this call and of the stream.
+  /// Learns from rows in their order. inputs: rows x inputs; outputs: rows x outputs; weights: one per row, from 0 to
+  /// 1e150, or empty. Throws std::invalid_argument, and learns nothing, if a shape differs, an input is infinite, an
+  /// output is not finite, a magnitude is above 1e150 or a weight is negative or no number, naming the row of this call
+  /// and of the stream.
   void add(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
            const Eigen::Ref<const Eigen::VectorXd>& weights = Eigen::VectorXd());
 
