@@ -17,7 +17,16 @@ import sys
 
 import numpy as np
 import pytest
-from fitted_models import MODELS, assert_same, constants, every_model, fitted, function_of, predictions  # noqa: F401
+from fitted_models import (  # noqa: F401
+    MODELS,
+    PROGRAM,
+    assert_same,
+    constants,
+    every_model,
+    fitted,
+    function_of,
+    predictions,
+)
 
 from llmt.export import to_latex, to_onnx, to_python, to_sql, to_sympy
 from llmt.export.model import read
@@ -105,9 +114,23 @@ def test_python_refuses_bad_rows_and_names(fitted):
         predict([1.0, 1.0, 1.0])
     with pytest.raises(KeyError, match="größe"):
         predict({"a": 1.0, 'width "w", mm': 1.0, "c_1": 1.0})
-    for name in ("2f", "a b", "def", ""):
+    for name in ("2f", "a b", ""):
         with pytest.raises(ValueError, match="identifier"):
             to_python(fitted("crisp").model, name)
+
+
+@pytest.mark.parametrize("name", ["math", "ｍath", "float", "len", "zip", "hasattr", "enumerate", "def", "__debug__"])
+def test_python_refuses_names_that_mean_something_else(name):
+    with pytest.raises(ValueError, match=f"name is '{name}', which means something else"):
+        to_python(constants(), name)
+
+
+@pytest.mark.parametrize("name", ["RETURNS", "INPUTS", "NAME", "BLANKS", "x", "row", "d", "print", "_", "größe"])
+def test_python_takes_every_other_name(name):
+    predict, space = function_of(constants(), name)
+    assert [predict([2.0]), predict([2.5]), predict([None])] == [1.5, 2.5, 0.25 * 1.5 + 0.75 * 2.5]
+    assert predict.__name__ == name
+    assert "The prediction of 'y' for one row." in predict.__doc__ and "the order\n    'x'." in predict.__doc__
 
 
 def test_names_cannot_become_code():
@@ -221,7 +244,75 @@ def test_sql_names_what_it_gives(fitted):
     connection.execute(f"CREATE TABLE t (id INTEGER, {columns_of(model, 'REAL')})")
     cursor = connection.execute(to_sql(model, "t", "sqlite", keep=["c_1", "id"]))
     assert [column[0] for column in cursor.description] == ["c_1", "id", "y_pred", 'z "2"_pred']
-    assert 'FROM "a b"."c""d")' in to_sql(model, ("a b", 'c"d'))
+    assert 'FROM "a b"."c""d" AS t)' in to_sql(model, ("a b", 'c"d'))
+
+
+@pytest.mark.parametrize("dialect", ["sqlite", "duckdb"])
+@pytest.mark.parametrize("table", ["t", "x", "elsewhere"])
+def test_sql_refuses_a_table_without_an_input(dialect, table):
+    """SQLite takes a quoted name that is no column for a text."""
+    connection = sqlite3.connect(":memory:") if dialect == "sqlite" else pytest.importorskip("duckdb").connect()
+    connection.execute(f'CREATE TABLE {table} ("x " DOUBLE PRECISION, id INTEGER)')
+    connection.execute(f"INSERT INTO {table} VALUES (1.0, 7)")
+    for keep in ([], ["id"]):
+        with pytest.raises(Exception, match=r"no such column: t\.x|\"x\""):
+            connection.execute(to_sql(constants(), table, dialect, keep)).fetchall()
+    connection.execute("CREATE TABLE right_one (x DOUBLE PRECISION)")
+    connection.execute("INSERT INTO right_one VALUES (1.0)")
+    assert connection.execute(to_sql(constants(), "right_one", dialect)).fetchall() == [(1.5,)]
+    with pytest.raises(Exception, match="id"):
+        connection.execute(to_sql(constants(), "right_one", dialect, ["id"])).fetchall()
+
+
+# Cells of a table that was imported as text, and what `llmt predict` makes of them: None is a missing value.
+NUMBERS_AS_TEXT = {"1": 1.0, " 2.5\t\r": 2.5, "-3e0": -3.0, "+4": 4.0, ".5": 0.5, "5.": 5.0, "1E2": 100.0, "-0": 0.0}
+MISSING = ["", " ", "NA", "n/a", "NaN", "nan", "null", " Null\t", "?"]
+NO_NUMBERS = ["word", "0x10", "1,5", "inf", "-inf", "1e400", "1e", "1 2", "12abc", "1_0", "--1", ".", "none", "nan(1)"]
+
+
+@pytest.mark.parametrize("kind", ["TEXT", "REAL", "NUMERIC", "INTEGER", "BLOB", ""])
+def test_sqlite_reads_text_as_predict_does(kind, tmp_path):
+    model = constants()
+    model["partitions"][0]["nodes"][0]["split"]["threshold"] = 2.25
+    connection = sqlite3.connect(":memory:")
+    connection.execute(f"CREATE TABLE t (id INTEGER, x {kind}, y TEXT)")
+    connection.executemany(
+        "INSERT INTO t (id, x) VALUES (?, ?)", enumerate([*NUMBERS_AS_TEXT, *MISSING, *NO_NUMBERS, None, b"1"])
+    )
+    got = [row[1] for row in connection.execute(to_sql(model, "t", "sqlite", ["id"]) + " ORDER BY 1")]
+    numbers = [1.5 if number <= 2.25 else 2.5 for number in NUMBERS_AS_TEXT.values()]
+    missing = 0.25 * 1.5 + 0.75 * 2.5
+    assert got == numbers + [missing] * len(MISSING) + [None] * len(NO_NUMBERS) + [missing, None]
+
+
+def test_the_cells_above_are_what_predict_says(tmp_path):
+    path = tmp_path / "constants.json"
+    path.write_text(json.dumps(constants()))
+
+    def predicted(cell):
+        (tmp_path / "rows.csv").write_text(f'x,other\n"{cell}",1\n')
+        command = [PROGRAM, "predict", str(path), str(tmp_path / "rows.csv")]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    if PROGRAM is None:
+        pytest.skip("there is no program llmt, and LLMT_PROGRAM names none")
+    for cell, number in NUMBERS_AS_TEXT.items():
+        assert predicted(cell).stdout.rsplit(",", 4)[1] == ("1.5" if number <= 2.0 else "2.5"), cell
+    for cell in MISSING:
+        assert predicted(cell).stdout.rsplit(",", 4)[1] == "2.25", cell
+    for cell in NO_NUMBERS:
+        assert predicted(cell).returncode == 1, cell
+
+
+def test_sqlite_gives_no_prediction_of_a_row_with_a_cell_that_is_no_number(fitted):
+    model = fitted("codes")
+    rows = [list(row) for row in model.rows]
+    for j in range(len(rows[0])):
+        rows[j][j] = "word"
+    got = in_sqlite(model.model, rows, to_sql(model.model, "t", "sqlite", keep=["id"]), "t")
+    assert [row[1] for row in got[: len(rows[0])]] == [None] * len(rows[0])
+    rest = slice(len(rows[0]), None)
+    assert_same(np.array([row[1:] for row in got[rest]], dtype=float), model.predicted[rest], 1e-12)
 
 
 @every_model
@@ -343,21 +434,27 @@ def test_deep_trees(tmp_path, levels):
     predict, _ = function_of(model)
     np.testing.assert_array_equal([[predict(row)] for row in rows], expected)
     if levels > 65:
-        for export in (to_onnx, lambda model: to_sql(model, "t")):
-            with pytest.raises(ValueError, match="more than 65 splits deep"):
-                export(model)
+        with pytest.raises(ValueError, match="more than 65 splits deep"):
+            to_sql(model, "t")
+        pytest.importorskip("onnx")
+        with pytest.raises(ValueError, match="more than 65 splits deep"):
+            to_onnx(model)
     else:
         got = in_sqlite(model, rows, to_sql(model, "t", "sqlite", keep=["id"]), "t")
         assert_same(np.array([row[1:] for row in got]), expected, 1e-12)
         assert_same(in_onnx(model, rows), expected, 1e-12)
 
 
-def test_what_is_no_model_is_refused():
-    for export in (to_python, to_onnx, to_sympy, to_latex, lambda model: to_sql(model, "t")):
-        with pytest.raises(ValueError, match="llmt-model"):
-            export({"format": "llmt-stream"})
-        with pytest.raises(ValueError, match="version 7"):
-            export({**constants(), "version": 7})
+@pytest.mark.parametrize("name", ["python", "onnx", "sympy", "latex", "sql"])
+def test_what_is_no_model_is_refused(name):
+    if name in ("onnx", "sympy"):
+        pytest.importorskip(name)
+    exports = {"python": to_python, "onnx": to_onnx, "sympy": to_sympy, "latex": to_latex}
+    export = exports.get(name, lambda model: to_sql(model, "t"))
+    with pytest.raises(ValueError, match="llmt-model"):
+        export({"format": "llmt-stream"})
+    with pytest.raises(ValueError, match="version 7"):
+        export({**constants(), "version": 7})
 
 
 def test_missing_packages_are_named(monkeypatch):

@@ -1,6 +1,10 @@
 """A model as the source text of a Python function that needs nothing but the module `math`."""
 
+import ast
+import builtins
 import keyword
+import re
+import unicodedata
 from collections.abc import Iterable
 from typing import Any
 
@@ -193,6 +197,22 @@ def NAME(row):
 '''
 
 
+# What a function of this name would hide from the others.
+_USED = {"math"} | {
+    node.id
+    for node in ast.walk(ast.parse(_RUNTIME.replace("@", "")))
+    if isinstance(node, ast.Name) and hasattr(builtins, node.id)
+}
+
+
+def _check_name(name: str) -> None:
+    if not name.isidentifier():
+        raise ValueError(f"name is {name!r}, it must be an identifier of Python")
+    meant = unicodedata.normalize("NFKC", name)  # as Python reads identifiers
+    if keyword.iskeyword(meant) or meant in _USED or (meant.startswith("__") and meant.endswith("__")):
+        raise ValueError(f"name is {name!r}, which means something else in Python source; take another one")
+
+
 def _table(name: str, entries: Iterable[Any]) -> str:
     return f"{name} = (\n" + "".join(f"    {entry!r},\n" for entry in entries) + ")\n"
 
@@ -247,13 +267,13 @@ def to_python(model: dict[str, Any], name: str = "predict") -> str:
     `exp` of the C library is the same). All guards, categories, missing values and validities are in it.
 
     `model` is what `json.loads` makes of the text of a model file. `name` is the name of the function, and the
-    beginning of all other names of the text. Raises ValueError if `model` is not such a model or `name` no identifier.
+    beginning of all other names of the text. Raises ValueError if `model` is not such a model, if `name` is no
+    identifier, and if it is a word of Python or a name that the text uses (`math`, `len`).
 
     >>> source = to_python(json.loads(text), "strength")  # doctest: +SKIP
     >>> exec(source)  # doctest: +SKIP
     """
-    if not name.isidentifier() or keyword.iskeyword(name):
-        raise ValueError(f"name is {name!r}, it must be an identifier of Python")
+    _check_name(name)
     tree = read(model)
     prefix = f"_{name}"
     columns = [
@@ -265,15 +285,17 @@ def to_python(model: dict[str, Any], name: str = "predict") -> str:
     if not single:
         returns = f"The predictions of {list(tree.outputs)!a}, a list,"
     returns = returns.replace("\\", "\\\\").replace('"', '\\"')
-    runtime = (
-        _RUNTIME.replace("BLANKS", repr(BLANKS))
-        .replace("MOST_ANCESTORS", str(MOST_ANCESTORS))
-        .replace("OUTPUTS", str(len(tree.outputs)))
-        .replace("RESULT", "y[0]" if single else "y")
-        .replace("def NAME", f"def {name}")
-        .replace("@", prefix)
-    )
-    runtime = runtime.replace("RETURNS", returns).replace("    INPUTS.", f"    {_order(tree.inputs)}.")
+    words = {
+        "@": prefix,
+        "BLANKS": repr(BLANKS),
+        "INPUTS": _order(tree.inputs),
+        "MOST_ANCESTORS": str(MOST_ANCESTORS),
+        "NAME": name,
+        "OUTPUTS": str(len(tree.outputs)),
+        "RESULT": "y[0]" if single else "y",
+        "RETURNS": returns,
+    }
+    runtime = re.sub(r"@|\b[A-Z_]+\b", lambda word: words.get(word[0], word[0]), _RUNTIME)
     return (
         "# Local linear model tree, written by llmt.\nimport math\n\n# name, low, high, centre, levels, codes\n"
         + _table(f"{prefix}_INPUTS", columns)

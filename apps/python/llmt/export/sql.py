@@ -9,7 +9,17 @@ from typing import Any
 
 from .additive import Terms, terms
 from .model import Model, Node, Partition, read
-from .sql_text import name_of, number, smooth_clamp, string, sum_of
+from .sql_text import (
+    SQLITE_BLANKS,
+    column_of,
+    is_no_sqlite_number,
+    name_of,
+    number,
+    smooth_clamp,
+    sqlite_number,
+    string,
+    sum_of,
+)
 
 _DIALECTS = ("duckdb", "postgresql", "sqlite")
 # Every letter is a table of columns that need those of the tables before: factors of products; deviations, gates and
@@ -41,6 +51,7 @@ class _Statement:
         self.columns: dict[str, list[str]] = {step: [] for step in _STEPS}
         self.names: dict[tuple[int, float, float], str] = {}  # of the columns of held deviations
         self.uses = self.count_uses()
+        self.has_no_numbers = False  # whether inputs() has a column no_number: 1 where a cell is none
 
     def add(self, step: str, name: str, expression: str) -> str:
         self.columns[step].append(f"{expression} AS {name}")
@@ -49,19 +60,21 @@ class _Statement:
     def inputs(self) -> list[str]:
         """Numbers as doubles, NULL where they are missing; categories as positions of their levels."""
         columns = []
+        no_numbers = []
         for j, column in enumerate(self.model.inputs):
-            name = name_of(column.name)
+            name = column_of(column.name)
             if column.levels:
                 labels = {label: i for i, label in enumerate(column.levels)}
                 for value, i in column.numbers.items():  # the text of a double in DuckDB and SQLite
                     labels.setdefault(repr(value), i)
                 whens = " ".join(f"WHEN {string(label)} THEN {i}" for label, i in labels.items())
-                blanks = "' '||CHAR(9,13)" if self.dialect == "sqlite" else "' '||CHR(9)||CHR(13)"
+                blanks = SQLITE_BLANKS if self.dialect == "sqlite" else "' '||CHR(9)||CHR(13)"
                 columns.append(f"CASE TRIM(CAST({name} AS TEXT),{blanks}) {whens} END AS x{j}")
                 continue
             x = f"CAST({name} AS DOUBLE PRECISION)"
-            if self.dialect == "sqlite":  # a NaN is NULL, but an empty text would be 0
-                x = f"CAST(NULLIF({name},'') AS REAL)"
+            if self.dialect == "sqlite":  # a NaN is NULL; other databases refuse text that is no number
+                x = sqlite_number(name)
+                no_numbers.append(f"WHEN {is_no_sqlite_number(name)} THEN 1")
             else:
                 x = f"NULLIF({x},CAST('NaN' AS DOUBLE PRECISION))"
             if column.codes:
@@ -71,6 +84,9 @@ class _Statement:
                 )
                 x = f"CASE WHEN {x} IS NULL THEN NULL {whens} ELSE {len(codes) - 1} END"
             columns.append(f"{x} AS x{j}")
+        if no_numbers:
+            columns.append(f"CASE {' '.join(no_numbers)} ELSE 0 END AS no_number")
+            self.has_no_numbers = True
         return columns
 
     def deviations(self) -> None:
@@ -272,6 +288,8 @@ class _Statement:
                 if ends := partition.output_range and partition.output_range[o]:
                     low, high = (number(end) for end in ends)
                     y = f"CASE WHEN {y}<{low} THEN {low} WHEN {y}>{high} THEN {high} ELSE {y} END"
+                if self.has_no_numbers:
+                    y = f"CASE WHEN no_number=0 THEN {y} END"
                 results[column] = f"{y} AS {name_of(self.model.outputs[column] + '_pred')}"
         return results
 
@@ -283,13 +301,17 @@ def to_sql(
 
     It says what `llmt predict` says, guards and missing values included, but for the rounding of sums. NULL, and NaN
     where the database has it, is a missing value; a category is compared by its label, without blanks at the ends. An
-    infinite value, which `llmt predict` refuses, is taken.
+    infinite value, which `llmt predict` refuses, is taken, but in SQLite.
 
     `model` is what `json.loads` makes of the text of a model file. `table` is the name of the table, or a sequence of
     names: ("schema", "table"). `dialect` is "postgresql", "duckdb" or "sqlite" (3.35 or later). `keep` names columns of
     the table that the result has too, such as its key: SQL does not promise an order of the rows. Gaussian and logistic
-    validities need the function EXP, which SQLite has if it was built with its mathematical functions. SQLite takes
-    text that is no number for 0, so check the types of the columns there.
+    validities need the function EXP, which SQLite has if it was built with its mathematical functions.
+
+    A table without one of the inputs is an error in every database. Text that is no number is an error but in SQLite,
+    whose columns hold anything: there it is read as `llmt predict` reads a cell. Text of a number is that number, an
+    empty text, NA, N/A, NaN, null and ? are missing values, and where `llmt predict` refuses the cell, the predictions
+    of the row are NULL.
 
     Raises ValueError for another dialect, a name with a NUL character, and trees of more than 1500 splits or 65 levels.
     """
@@ -314,9 +336,9 @@ def to_sql(
             statement.gates(p, partition)
         statement.partition(p, partition)
     names = [table] if isinstance(table, str) else list(table)
-    kept = [f"{name_of(column)} AS k{i}" for i, column in enumerate(keep)]
+    kept = [f"{column_of(column)} AS k{i}" for i, column in enumerate(keep)]
     text = "WITH llmt_x AS (SELECT\n " + ",\n ".join(kept + statement.inputs())
-    text += "\n FROM " + ".".join(name_of(part) for part in names) + ")"
+    text += "\n FROM " + ".".join(name_of(part) for part in names) + " AS t)"
     fence = "" if dialect == "duckdb" else "MATERIALIZED "
     last = "llmt_x"
     for step, columns in statement.columns.items():

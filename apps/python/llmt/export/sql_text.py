@@ -13,6 +13,40 @@ def name_of(text: str) -> str:
     return '"' + text.replace('"', '""') + '"'
 
 
+def column_of(text: str) -> str:
+    """A column of the table that is called t. Without the table SQLite takes a column that is not there for a text."""
+    return "t." + name_of(text)
+
+
+SQLITE_BLANKS = "' '||CHAR(9,13)"
+_LARGEST = "1.7976931348623157e308"
+_NO_VALUE = "'','na','n/a','nan','null','?'"  # as in a CSV file
+
+
+def _is_number_of_text(column: str) -> str:
+    """Whether text of SQLite is a number. Compared with a number, text that looks like one becomes one, as a whole."""
+    text = f"TRIM({column},{SQLITE_BLANKS})"
+    return f"CAST({text} AS NUMERIC)={text} AND ABS(CAST({text} AS REAL))<={_LARGEST}"
+
+
+def sqlite_number(column: str) -> str:
+    """The number of a cell; NULL where it is missing or no number."""
+    of_text = f"CAST(TRIM({column},{SQLITE_BLANKS}) AS REAL)"
+    return (
+        f"CASE TYPEOF({column}) WHEN 'text' THEN CASE WHEN {_is_number_of_text(column)} THEN {of_text} END"
+        f" WHEN 'blob' THEN NULL ELSE CAST({column} AS REAL) END"
+    )
+
+
+def is_no_sqlite_number(column: str) -> str:
+    """Whether a cell is neither a finite number nor missing."""
+    is_missing = f"LOWER(TRIM({column},{SQLITE_BLANKS})) IN ({_NO_VALUE})"
+    return (
+        f"CASE TYPEOF({column}) WHEN 'text' THEN NOT ({_is_number_of_text(column)}) AND NOT {is_missing}"
+        f" WHEN 'blob' THEN 1 ELSE ABS(CAST({column} AS REAL))>{_LARGEST} END"
+    )
+
+
 def string(text: str) -> str:
     return "'" + text.replace("'", "''") + "'"
 
