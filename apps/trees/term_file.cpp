@@ -13,6 +13,7 @@
 
 #include "expressions/expression.hpp"
 #include "llmt/files.hpp"
+#include "llmt/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -129,6 +130,10 @@ std::vector<discovery::ModelTerm> parse_terms(const std::string& text, const std
     for (Eigen::Index i = 0; i < values.rows(); ++i) {
       if (!std::isfinite(values(i, 0))) {
         refuse(fmt::format("{}: \"{}\" is not a finite number at data row {}", name, expression, i + 1));
+      }
+      if (std::abs(values(i, 0)) > largest_magnitude) {
+        refuse(fmt::format("{}: \"{}\" is {} at data row {}, the largest magnitude is {}", name, expression,
+                           values(i, 0), i + 1, largest_magnitude));
       }
     }
   }

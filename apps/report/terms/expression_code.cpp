@@ -11,6 +11,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "llmt/c_code.hpp"
+
 namespace llmt::report {
 namespace {
 
@@ -166,19 +168,21 @@ class Translation {
   std::size_t at_ = 0;
 };
 
-// Words that mean something in C, Python or the code that is written.
-const std::set<std::string>& reserved() {
+// Words that mean something in C, Python, muParser or the code that is written.
+bool is_reserved(const std::string& word) {
   static const std::set<std::string> words = {
-      "auto",    "break",    "case",       "char",     "const", "continue", "default",   "do",     "double",
-      "else",    "enum",     "extern",     "float",    "for",   "goto",     "if",        "inline", "int",
-      "long",    "register", "restrict",   "return",   "short", "signed",   "sizeof",    "static", "struct",
-      "switch",  "typedef",  "union",      "unsigned", "void",  "volatile", "while",     "and",    "as",
-      "assert",  "async",    "await",      "class",    "def",   "del",      "elif",      "except", "False",
-      "finally", "from",     "global",     "import",   "in",    "is",       "lambda",    "None",   "nonlocal",
-      "not",     "or",       "pass",       "raise",    "True",  "try",      "with",      "yield",  "np",
-      "pow",     "fabs",     "fmin",       "fmax",     "log",   "pi",       "llmt_sign", "sum",    "avg",
-      "rint",    "change",   "correction", "main",     "bool",  "true",     "false"};
-  return words;
+      "and",     "as",    "assert",    "async",  "await", "class", "def",    "del",       "elif",     "except", "False",
+      "finally", "from",  "global",    "import", "in",    "is",    "lambda", "None",      "nonlocal", "not",    "or",
+      "pass",    "raise", "True",      "try",    "with",  "yield", "np",     "pow",       "fabs",     "fmin",   "fmax",
+      "log",     "pi",    "llmt_sign", "sum",    "avg",   "rint",  "change", "correction"};
+  return words.contains(word) || is_c_word(word) || functions().contains(word);
+}
+
+// The longest name that muParser reads.
+constexpr std::size_t most_letters_of_word = 100;
+
+std::string with_ending(const std::string& word, const std::string& ending) {
+  return word.substr(0, most_letters_of_word - ending.size()) + ending;
 }
 
 }  // namespace
@@ -194,13 +198,13 @@ std::vector<std::string> words_for(const std::vector<std::string>& names) {
     std::string word;
     for (const char c : name) word += is_of_word(c) ? c : '_';
     if (word.empty() || !begins_word(word.front()) || word.front() == '_') word = "x" + word;
-    if (reserved().contains(word) || functions().contains(word)) word += "_";
-    std::string different = word;
+    if (is_reserved(word)) word += "_";
+    std::string different = with_ending(word, "");
     const auto is_taken = [&](const std::string& text) {
       return std::ranges::find(words, text) != words.end() ||
              (text != name && std::ranges::find(names, text) != names.end());
     };
-    for (int k = 2; is_taken(different); ++k) different = fmt::format("{}_{}", word, k);
+    for (int k = 2; is_taken(different); ++k) different = with_ending(word, fmt::format("_{}", k));
     words.push_back(different);
   }
   return words;

@@ -14,8 +14,8 @@ enum class CodeLanguage { c, python };
 /// `variables`. Throws std::runtime_error for operators, functions and constants that have no counterpart.
 std::string translated(const std::string& expression, const std::vector<std::string>& variables, CodeLanguage language);
 
-/// A word for each name, in order: the name itself where it is a word of letters, digits and _ that means nothing else
-/// in C, Python or muParser; else one made of it. All are different.
+/// A word for each name, in order: the name itself where it is a word of at most 100 letters, digits and _ that means
+/// nothing else in C, Python or muParser; else one made of it. All are different.
 std::vector<std::string> words_for(const std::vector<std::string>& names);
 
 }  // namespace llmt::report

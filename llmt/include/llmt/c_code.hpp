@@ -13,7 +13,11 @@ struct CSource {
   std::string header;  ///< text of the file .h
 };
 
-/// True if the text is an identifier of C of at most 31 characters, and no keyword.
+/// True if the text means something in every source of C that includes math.h: a keyword, `main`, a macro of math.h as
+/// INFINITY and M_PI, in whatever C library, or a macro of compilers as `linux`. No argument can have such a name.
+bool is_c_word(std::string_view text);
+
+/// True if the text is an identifier of C of at most 31 characters, and no is_c_word().
 bool is_c_identifier(std::string_view text);
 
 }  // namespace llmt

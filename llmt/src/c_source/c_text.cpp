@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
 #include <stdexcept>
@@ -112,15 +111,10 @@ CSource c_source_of(const std::string& comment, const std::string& name, const s
 }
 
 bool is_c_identifier(std::string_view text) {
-  constexpr std::array<std::string_view, 37> keywords = {
-      "auto",   "break",  "case",     "char",   "const",    "continue",   "default", "do",      "double", "else",
-      "enum",   "extern", "float",    "for",    "goto",     "if",         "inline",  "int",     "long",   "register",
-      "return", "short",  "signed",   "sizeof", "static",   "struct",     "switch",  "typedef", "union",  "unsigned",
-      "void",   "while",  "restrict", "_Bool",  "_Complex", "_Imaginary", "main"};
   const auto is_letter = [](char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; };
   return !text.empty() && text.size() <= 31 && is_letter(text[0]) &&
          std::ranges::all_of(text, [&](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '_'; }) &&
-         std::ranges::find(keywords, text) == keywords.end();
+         !is_c_word(text);
 }
 
 void check_c_name(const std::string& name) {
