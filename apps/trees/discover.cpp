@@ -122,6 +122,8 @@ report::TermsSummary discovered(const DiscoverArguments& arguments, const Compar
       }
       summary.missing = discovery::find_missing(simulation, comparison.inputs, comparison.measured, terms, options);
     }
+  } catch (const discovery::RandomSimulation& error) {
+    throw std::runtime_error(fmt::format("--simulate \"{}\": {}", source.command.command, error.what()));
   } catch (const std::invalid_argument& error) {
     // What the library refuses after the options were checked is in the data.
     throw std::runtime_error(fmt::format("{}: {}", arguments.measured, error.what()));

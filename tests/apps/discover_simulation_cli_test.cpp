@@ -147,6 +147,22 @@ TEST(DiscoverSimulate, ACommandIsFittedTogetherWithTerms) {
   }
 }
 
+TEST(DiscoverSimulate, ARandomCommandIsRefused) {
+  const Folder folder;
+  write_cart(folder, 0.0);
+  folder.write("noisy.awk",
+               "BEGIN { FS = \",\"; srand(seed) }\n"
+               "NR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i; print \"tau\"; next }\n"
+               "{ printf \"%.10g\\n\", $at[\"mass\"] * $at[\"ddq\"] + 1e-4 * rand() }\n");
+  const std::string command = "awk -v seed=$(($(od -An -N3 -tu4 /dev/urandom))) -f noisy.awk";
+  const Outcome outcome = folder.run(discover + "m.csv -t tau --simulate '" + command + "' --parameter mass=3");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("--simulate \"" + command + "\": the simulation "), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("was run twice at the same values, and \"tau\" is "), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find(" in data row 1; it must not be random"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find("m.csv"), std::string::npos) << outcome.err;
+}
+
 TEST(DiscoverSimulate, WhatACommandDoesWrongIsSaid) {
   const Folder folder;
   write_command(folder);

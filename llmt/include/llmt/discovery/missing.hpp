@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,12 @@ struct Simulation {
   /// inputs (n x p), values of all parameters -> n x d outputs. find_missing() and corrected() call it on the thread
   /// that called them, one call at a time, and let through what it throws.
   std::function<Eigen::MatrixXd(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values)> predict;
+};
+
+/// A simulation that gives other outputs when it is run again at the same inputs and values.
+class RandomSimulation : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
 };
 
 struct MeasuredOutputs {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "discovery/terms/missing_findings.hpp"
+#include "discovery/terms/random_simulation.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/statistics.hpp"
@@ -185,6 +186,7 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
   const Linearisation linearisation(simulation, derivatives, inputs, measured);
   const Eigen::VectorXd start = values_of(simulation.parameters);
   const Eigen::MatrixXd nominal = linearisation.outputs(start);
+  refuse_random(nominal, linearisation.outputs(start), measured.names);
   Eigen::VectorXd values = start;
   Eigen::MatrixXd outputs = nominal;
   Eigen::MatrixXd terms_added = Eigen::MatrixXd::Zero(outputs.rows(), outputs.cols());

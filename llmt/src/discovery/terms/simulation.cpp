@@ -16,6 +16,7 @@
 #include "discovery/terms/motion.hpp"
 #include "discovery/terms/one_search.hpp"
 #include "discovery/terms/progress_of_searches.hpp"
+#include "discovery/terms/random_simulation.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/reversals.hpp"
 #include "discovery/terms/row_split.hpp"
@@ -311,6 +312,12 @@ Missing find_along_rows(const Simulation& simulation, const Inputs& inputs, cons
 Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const MissingOptions& options) {
   check(simulation, inputs, measured, options);
+  const auto run = [&] { return simulation.predict(inputs.values, nominal_values(simulation)); };
+  const Eigen::MatrixXd simulated = run();
+  // What has the wrong shape is refused by the search.
+  if (simulated.rows() == measured.values.rows() && simulated.cols() == measured.values.cols()) {
+    refuse_random(simulated, run(), measured.names);
+  }
   refuse_determined(simulation, inputs, measured);
   const ProgressOfSearches progress(options.progress);
   MissingOptions watched = options;
