@@ -105,6 +105,16 @@ def test_latex_says_the_rules(fitted):
         assert values == [pytest.approx(model.predicted[i, 0], rel=1e-9)]
 
 
+def test_latex_says_on_which_side_a_threshold_lies():
+    """Rules hold from above their lower end up to their upper end, which is theirs."""
+    model = constants()
+    nodes = model["partitions"][0]["nodes"]
+    nodes[2]["split"] = {**nodes[0]["split"], "threshold": 3.0, "left": 3, "right": 4}
+    nodes += [{**nodes[1], "samples": 2, "value": [2.25]}, {**nodes[1], "samples": 3, "value": [2.75]}]
+    rules = re.findall(r"([0-9.]+) & \\text\{if \} ([^\n]*?)(?: \\\\)?\n", to_latex(model))
+    assert rules == [("1.5", r"x \le 2"), ("2.25", r"2 < x \le 3"), ("2.75", "x > 3")]
+
+
 @every_model
 def test_latex_is_balanced(fitted, name):
     text = to_latex(fitted(name).model)

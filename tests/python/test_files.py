@@ -71,3 +71,14 @@ def test_a_link_stays_a_link_and_names_may_be_any_bytes(tmp_path):
     link.symlink_to(target)
     model.save(link)
     assert link.is_symlink() and target.read_text() == model.model_.to_json()
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "{\"a\": " * 100_000, "[" * 100_000 + "]" * 100_000])
+def test_brackets_without_end_are_no_model(tmp_path, text):
+    path = tmp_path / "nested.json"
+    path.write_text(text)
+    for load in (llmt.load, llmt.Model.load, llmt.LocalLinearTreeRegressor.load):
+        with pytest.raises(ValueError, match="nested.json"):
+            load(path)
+    with pytest.raises(ValueError):
+        llmt.load_found(path)

@@ -65,6 +65,20 @@ def test_intervals_outside_of_the_training_ranges_are_warned_of(table, readable)
     )
 
 
+@pytest.mark.parametrize("beyond", [1e-6, 0.01, 0.5, 0.99, 1.0, 1.01])
+def test_intervals_just_outside_of_the_training_ranges_are_warned_of(table, readable, beyond):
+    """`beyond`: by this share of the range."""
+    ranges = table[0]["outdoor_C"].min(), table[0]["outdoor_C"].max()
+    for end, other in (ranges, ranges[::-1]):
+        X = table[0].head(4).copy()
+        X.loc[1, "outdoor_C"] = end
+        assert said(lambda: readable.predict_interval(X)) == ""
+        X.loc[1, "outdoor_C"] = end + beyond * (end - other)
+        assert "1 of 4 rows lie outside of the training ranges, the first is row 1" in said(
+            lambda: readable.predict_interval(X)
+        )
+
+
 def test_few_rows_are_warned_of(table):
     X, y = table
     assert "X has 3 rows: below 10" in said(lambda: LocalLinearTreeRegressor().fit(X[:3], y[:3]))

@@ -21,7 +21,10 @@ PROGRAM = textwrap.dedent("""
 
 
 def test_a_terminal_sees_a_bar_that_goes_away():
-    parent, child = pty.openpty()
+    try:
+        parent, child = pty.openpty()
+    except OSError as error:  # as in a chroot without /dev/pts
+        pytest.skip(f"the system has no pseudo-terminals: {error}")
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM], stderr=child, stdout=subprocess.PIPE, env={**os.environ, "TERM": "xterm"}
     ) as process:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from llmt.tables import read_column, read_table, read_targets, row_labels
+from llmt.tables.named import columns_of
 
 pd = pytest.importorskip("pandas")
 FRAME = pd.DataFrame({"x": [1.0, 2.5, np.nan], "k": [10, 9, 10], "w": ["ä", "b", None]})
@@ -107,6 +108,30 @@ def test_categorical_that_is_not_there(categorical, error, words):
         read_table(FRAME, categorical=categorical)
 
 
+@pytest.mark.parametrize("blanks", [" ", "\t", "\r", " \t\r\t "])
+def test_outer_blanks_are_no_part_of_a_word(blanks):
+    cells = [f"{blanks}red", f"red{blanks}", f"{blanks}red{blanks}", "red", f"r{blanks}ed"]
+    read = read_table(pd.DataFrame({"w": cells}))
+    assert read.levels == [sorted(["red", f"r{blanks}ed"])]
+    assert read.values[:4, 0].tolist() == [float(read.levels[0].index("red"))] * 4
+    assert read_table(pd.DataFrame({"w": cells}), levels=[["red"]]).unknown == [1]
+
+
+def test_words_that_stand_for_no_value():
+    missing = ["", " ", "NA", "na", "N/A", "n/a", "NaN", "nan", "NAN", "null", "NULL", "Null", " null\t", "?", "\r?"]
+    words = ["none", "nul", "nulls", "n.a.", "??", "-", "nan1", "na n", "N/A/"]
+    read = read_table(pd.DataFrame({"w": missing + words}))
+    assert read.levels == [sorted(words)]
+    assert np.isnan(read.values[: len(missing), 0]).all() and not np.isnan(read.values[len(missing) :, 0]).any()
+    assert read_table(pd.DataFrame({"w": missing + words}), levels=[["none"]]).unknown == [len(words) - 1]
+
+
+def test_ten_thousand_categories_are_taken():
+    read = read_table(pd.DataFrame({"id": [f"w{i}" for i in range(10000)]}))
+    assert [len(levels) for levels in read.levels] == [10000]
+    assert read.values[:, 0].tolist() == [float(k) for k in np.argsort(np.argsort([f"w{i}" for i in range(10000)]))]
+
+
 def test_categories_that_cannot_be():
     with pytest.raises(ValueError, match=r"column \"id\" has 10001 categories; at most 10000"):
         read_table(pd.DataFrame({"id": [f"w{i}" for i in range(10001)]}))
@@ -116,6 +141,14 @@ def test_categories_that_cannot_be():
         read_table(np.array([["\ud800"]]))
     with pytest.raises(ValueError, match="the name of column '.ud800' is no Unicode"):
         read_table(pd.DataFrame([[1.0]], columns=pd.Index(["\ud800"], dtype=object)))
+    for y in (pd.Series([1.0], name="\ud800"), pd.DataFrame([[1.0]], columns=pd.Index(["\ud800"], dtype=object))):
+        with pytest.raises(ValueError, match="the name of column '.ud800' is no Unicode"):
+            read_targets(y)
+    for cells in ([1.0, 2.0], ["a", "b"]):
+        with pytest.raises(ValueError, match="measured: the name of column 'q.ud800' is no Unicode"):
+            columns_of({"a": [1.0, 2.0], "q\ud800": cells}, "measured")
+    with pytest.raises(ValueError, match="measured: '.ud800' in column 'kind' is no Unicode"):
+        columns_of({"kind": ["a", "\ud800"]}, "measured")
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,7 @@ def load_found(source: str | os.PathLike[str] | Mapping[str, Any]) -> Found:
     text = source if isinstance(source, str) and source.lstrip().startswith("{") else Path(source).read_text("utf-8")
     try:
         data = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f"this is no JSON: {error}") from None
     if not isinstance(data, dict):
         raise ValueError("this is no JSON object of llmt discover")

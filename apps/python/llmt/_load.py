@@ -29,7 +29,7 @@ def load(path: "str | os.PathLike[str]") -> LocalLinearTreeRegressor | BoostedLo
     with open(path, encoding="utf-8") as file:
         try:
             content = json.load(file)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise ValueError(f"{os.fspath(path)}: no model, which is JSON text: {error}") from None
     is_boosted = isinstance(content, dict) and content.get("format") == "llmt-boosted-model"
     return (BoostedLocalLinearTreeRegressor if is_boosted else LocalLinearTreeRegressor).load(path)

@@ -155,7 +155,7 @@ def _read_numbers(y: Any, name: str) -> tuple[np.ndarray, list[str] | None]:
     _refuse_nan(raw, name)
     if raw.dimensions == 1:
         label = raw.labels[0] if raw.labels else None
-        return raw.values[:, 0], [label] if isinstance(label, str) and label else None
+        return raw.values[:, 0], feature_names([label]) if isinstance(label, str) and label else None
     return raw.values, feature_names(raw.labels)
 
 

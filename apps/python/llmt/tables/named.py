@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .raw import Raw
+from .raw import Raw, refuse_surrogates
 from .sources import read_raw
 
 Cells = np.ndarray | list[float | str]
@@ -19,14 +19,17 @@ def columns_of(table: Any, what: str) -> dict[str, Cells]:
     array or a list of mappings. A column is numbers where ``read_table()`` has it so; any other cell is its text.
 
     Raises TypeError for other things and for names that are no words, ValueError for columns of unequal length, names
-    that are there twice and no rows. ``what`` names the argument.
+    that are there twice, text that is no Unicode and no rows. ``what`` names the argument.
     """
     columns: dict[str, Cells] = {}
     for name, cells in _pairs_of(table, what):
         if not isinstance(name, str):
             raise TypeError(f"{what}: a column is called {name!r}; a name is a word with its unit, as q1_deg or x_mm")
+        refuse_surrogates(name, f"{what}: the name of column {name!r}")
         if name in columns:
             raise ValueError(f"{what}: column {name!r} is there twice")
+        for cell in {cell for cell in cells if isinstance(cell, str)} if isinstance(cells, list) else ():
+            refuse_surrogates(cell, f"{what}: {cell!r} in column {name!r}")
         columns[name] = cells
     if not columns:
         raise ValueError(f"{what}: no columns")
