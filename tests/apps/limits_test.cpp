@@ -143,7 +143,7 @@ void ask(Limit limit, double size) {
     case Limit::sum_leaf_slopes:
       oracle::leaf_of_slopes(count);
       return;
-    case Limit::sum_trials_per_leaf:
+    case Limit::sum_trials:
       oracle::explain_counting_leaf(count);
       return;
     case Limit::description_bytes:
@@ -232,8 +232,8 @@ std::string refusal(Limit limit) {
       return "too many to be listed";
     case Limit::sum_leaf_slopes:
       return "more than 12 slopes";
-    case Limit::sum_trials_per_leaf:
-      return "more than 4096 trials a leaf";
+    case Limit::sum_trials:
+      return "more than 10000 trials";
     case Limit::description_bytes:
       return "it holds more than 16 MiB";
     case Limit::yaml_nodes:
@@ -286,11 +286,9 @@ TEST_P(EachLimit, IsTakenAndOneMoreIsRefused) {
   const double beyond = row.unit == llmt::LimitUnit::power
                             ? std::nextafter(row.most, std::numeric_limits<double>::infinity())
                             : row.most + 1.0;
-  const double smallest_step = row.limit == Limit::listed_sides          ? of_a_box
-                               : row.limit == Limit::sum_trials_per_leaf ? 2400.0
-                                                                         : 0.0;
+  const bool has_steps = row.limit == Limit::listed_sides || row.limit == Limit::sum_trials;
   EXPECT_EQ(message(row.limit, row.most).find(refusal(row.limit)), std::string::npos) << message(row.limit, row.most);
-  const std::string refused = message(row.limit, beyond + smallest_step);
+  const std::string refused = message(row.limit, beyond + (has_steps ? of_a_box : 0.0));
   EXPECT_NE(refused.find(refusal(row.limit)), std::string::npos) << refused.substr(0, 300);
 }
 

@@ -32,8 +32,7 @@ std::string table_of_sum() {
 }
 
 Json fitted_sum(const std::string& program) {
-  const Outcome outcome =
-      run({program, "fit", "sums.csv", "-t", "y", "--boost", "--max-rounds", "8", "-o", "sum.json"}, {.seconds = 60.0});
+  const Outcome outcome = run({program, "fit", "sums.csv", "-t", "y", "--boost", "-o", "sum.json"}, {.seconds = 60.0});
   if (outcome.exit_code != 0) throw std::runtime_error("no base sum: " + outcome.err);
   return Json::parse(read("sum.json"));
 }

@@ -32,7 +32,7 @@ struct Attributions {
 ///
 /// Exact: each tree is walked once for x and b together, and what comes to its leaves is integrated as polynomials
 /// (docs/algorithms/explanation.md). Where pairs of inputs, limits of leaves or a smallest_share do not allow that,
-/// inputs are tried one by one, at most Limit::sum_trials_per_leaf times for each leaf of the tree. The time grows with
+/// inputs are tried one by one, at most Limit::sum_trials times in a tree. The time grows with
 /// the background.
 ///
 /// Throws std::invalid_argument if a number of columns differs, a value is infinite, there is no background, or a tree

@@ -28,7 +28,7 @@ enum class Limit {
   model_splits_above_leaf,
   listed_sides,
   sum_leaf_slopes,
-  sum_trials_per_leaf,
+  sum_trials,
   description_bytes,
   yaml_nodes,
   expression_characters,
@@ -89,9 +89,9 @@ inline constexpr std::array limit_table = std::to_array<LimitRow>({
     {Limit::listed_sides, "sides and levels of the boxes of all leaves, where they are listed", 100'000'000,
      LimitUnit::count, "refused with the tree's number"},
     {Limit::sum_leaf_slopes, "slopes in a leaf of a sum of trees", 12, LimitUnit::count, "refused with file and place"},
-    // As many as a leaf of 12 slopes at its limits may need.
-    {Limit::sum_trials_per_leaf, "inputs tried from either row to explain a tree of a sum, for each of its leaves",
-     4096, LimitUnit::count, "refused with the tree's place"},
+    // A leaf of 12 slopes at its limits may need 4095, the trees of fits need some ten.
+    {Limit::sum_trials, "inputs tried one by one to explain a tree of a sum, for a row and one to compare with", 10'000,
+     LimitUnit::count, "refused with the tree's place"},
     {Limit::description_bytes, "robot description, mechanism, catalogue, terms", 1 << 24, LimitUnit::bytes, "refused"},
     {Limit::yaml_nodes, "keys, values and lists of a YAML file", 300'000, LimitUnit::count,
      "refused with file and line"},

@@ -41,9 +41,9 @@ std::vector<std::vector<const GameRule*>> rules_of(const BoostedModel& model, st
 
 [[noreturn]] void refuse(std::size_t output, std::size_t tree) {
   throw std::invalid_argument(fmt::format(
-      "llmt::attribute: sums/{}/trees/{}: more than {} trials a leaf: too many inputs meet in pairs, at the "
-      "limits of a leaf, or at soft splits with a smallest_share",
-      output, tree, most(Limit::sum_trials_per_leaf)));
+      "llmt::attribute: sums/{}/trees/{}: more than {} trials of an input: too many inputs meet in pairs, at "
+      "the limits of a leaf, or where soft splits end by smallest_share",
+      output, tree, most(Limit::sum_trials)));
 }
 
 // Rows of the background that a tree stays in the cache for.

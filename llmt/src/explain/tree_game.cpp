@@ -7,7 +7,6 @@
 #include "boosted/model/boosted_checks.hpp"
 #include "boosted/model/transition.hpp"
 #include "llmt/limits.hpp"
-#include "numerics/quadrature.hpp"
 
 namespace llmt {
 namespace {
@@ -22,56 +21,6 @@ bool is_within(const BoostedSplit& split, double z) { return std::abs(z - split.
 double without_dust(double factor) { return factor < 1e-290 ? 0.0 : factor; }
 
 }  // namespace
-
-int order_for(const BoostedTree& tree, const std::vector<BoostedFeature>& features) {
-  std::vector<int> uses;  // of each input, on the path
-  int inputs = 0;
-  const auto use = [&](int input, int change) {
-    if (input < 0) return;
-    if (std::ssize(uses) <= input) uses.resize(input + 1, 0);
-    inputs += change > 0 ? uses[input] == 0 : -static_cast<int>(uses[input] == 1);
-    uses[input] += change;
-  };
-  const auto use_feature = [&](int feature, int change) {
-    use(features[feature].first, change);
-    use(features[feature].second, change);
-  };
-  int most_inputs = 0;
-  struct Visit {
-    int at;
-    bool is_over;
-  };
-  std::vector<Visit> visits = {{tree.splits.empty() ? -1 : 0, false}};
-  while (!visits.empty()) {
-    const auto [at, is_over] = visits.back();
-    visits.pop_back();
-    if (at < 0) {
-      const std::vector<int>& of_leaf = tree.leaves[-1 - at].features;
-      for (const int feature : of_leaf) use_feature(feature, 1);
-      most_inputs = std::max(most_inputs, inputs);
-      for (const int feature : of_leaf) use_feature(feature, -1);
-      continue;
-    }
-    const BoostedSplit& split = tree.splits[at];
-    use_feature(split.feature, is_over ? -1 : 1);
-    if (is_over) continue;
-    visits.push_back({at, true});
-    visits.push_back({split.left, false});
-    visits.push_back({split.right, false});
-  }
-  return std::max(2, (most_inputs + 3) / 4 * 2);
-}
-
-GameRule::GameRule(int order) {
-  const Quadrature rule = gauss_legendre(order);
-  row = rule.nodes;
-  weights = rule.weights;
-  for (int k = 0; k < order; ++k) {
-    background.push_back(1.0 - row[k]);
-    per_row.push_back(weights[k] / row[k]);
-    per_background.push_back(-weights[k] / background[k]);
-  }
-}
 
 TwoRows::TwoRows(const BoostedModel& model, const BoostedSum& sum, const double* x, const double* background,
                  Work& work)
@@ -100,7 +49,6 @@ bool TwoRows::add_values(const BoostedTree& tree, const GameRule& rule, double s
   std::fill_n(products(), order(), 1.0);
   std::fill_n(sums(), order(), 0.0);
   trials_ = 0;
-  const auto most_trials = most(Limit::sum_trials_per_leaf) * std::ssize(tree.leaves);
   tasks_.push_back({Task::Kind::go, tree.splits.empty() ? -1 : 0, 1.0, -1, {}});
   while (!tasks_.empty()) {
     const Task task = tasks_.back();
@@ -111,7 +59,7 @@ bool TwoRows::add_values(const BoostedTree& tree, const GameRule& rule, double s
     }
     if (task.input >= 0) go_to(task.input, task.factors);
     walk(task.at, task.share);
-    if (trials_ > most_trials) return false;
+    if (trials_ > most(Limit::sum_trials)) return false;
     constexpr std::int64_t steps_between_looks = 1024;
     if (++steps_ % steps_between_looks == 0) work_.check();
   }
@@ -257,12 +205,16 @@ void TwoRows::go_to(int input, const Factors& factors) {
     return;
   }
   for (std::size_t k = 0; k < order; ++k) {
-    const double q_before = before.row * p[k] + before.background * rest[k];
     const double q = factors.row * p[k] + factors.background * rest[k];
-    product[k] = above[k] * (q / q_before);
+    product[k] = above[k] * q;
+    weight[k] = rule_->weights[k] * ((factors.row - factors.background) / q);
     sum[k] = 0.0;
-    weight[k] =
-        rule_->weights[k] * ((factors.row - factors.background) / q - (before.row - before.background) / q_before);
+  }
+  if (before.are_one()) return;
+  for (std::size_t k = 0; k < order; ++k) {
+    const double q = before.row * p[k] + before.background * rest[k];
+    product[k] /= q;
+    weight[k] -= rule_->weights[k] * ((before.row - before.background) / q);
   }
 }
 

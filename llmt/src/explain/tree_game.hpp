@@ -7,25 +7,11 @@
 #include <optional>
 #include <vector>
 
+#include "explain/game_rule.hpp"
 #include "llmt/boosted_model.hpp"
 #include "llmt/progress.hpp"
 
 namespace llmt {
-
-/// The order of a quadrature that integrates the games of a tree exactly: half the number of different inputs on the
-/// way to a leaf and in it, where these are most, rounded up to an even number.
-int order_for(const BoostedTree& tree, const std::vector<BoostedFeature>& features);
-
-/// Gauss-Legendre quadrature of an even order over the probability p that an input is taken from the row.
-struct GameRule {
-  explicit GameRule(int order);
-
-  std::vector<double> row;         ///< p at the nodes
-  std::vector<double> background;  ///< 1 - p
-  std::vector<double> weights;
-  std::vector<double> per_row;         ///< weights / p
-  std::vector<double> per_background;  ///< weights / (p - 1)
-};
 
 /// The two rows that inputs are taken from, and the features that follow.
 ///
@@ -40,7 +26,7 @@ class TwoRows {
   TwoRows(const BoostedModel& model, const BoostedSum& sum, const double* x, const double* background, Work& work);
 
   /// Adds `scale` times the Shapley values of the inputs in the tree to `values`, one for each input. `rule`: of
-  /// order_for() at least. False if that needs more trials than a tree may take (Limit::sum_trials_per_leaf); `values`
+  /// order_for() at least. False if that needs more trials than a tree may take (Limit::sum_trials); `values`
   /// is then of no use.
   [[nodiscard]] bool add_values(const BoostedTree& tree, const GameRule& rule, double scale,
                                 Eigen::Ref<Eigen::VectorXd> values);
