@@ -148,19 +148,19 @@ TEST(ArrowProgram, AStateThatIsWrongIsNamed) {
   const std::string fit = llmt_program + " fit d.arrow -t y --memory 100K --cv 0 --checkpoint ";
   const std::vector<std::string> states = state_files::split(folder.run(fit + "/dev/stdout | cat").out);
   ASSERT_GE(states.size(), 3);
-  for (std::size_t k = 0; k < states.size(); ++k) {
+  for (const std::size_t k : {std::size_t{0}, states.size() / 2, states.size() - 1}) {
     folder.write("state", states[k]);
     EXPECT_EQ(folder.run(fit + "state --resume").exit_code, 0) << k;
     // The first words are options, columns, counts and the like; among them is one of each kind of error.
     int refused = 0;
-    for (std::size_t word = 0; word < 40; ++word) {
+    for (std::size_t word = 0; word < 40; word += 3) {
       folder.write("state", with_word(states[k], word, std::int64_t{1} << 40));
       const Outcome outcome = folder.run(fit + "state --resume");
       if (outcome.exit_code == 0) continue;
       ++refused;
       expect_refusal(outcome, 1, "llmt: state: ");
     }
-    EXPECT_GT(refused, 20) << k;
+    EXPECT_GT(refused, 7) << k;
   }
 }
 

@@ -293,7 +293,7 @@ TEST_P(EachLimit, IsTakenAndOneMoreIsRefused) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Limits, EachLimit, testing::ValuesIn(llmt::limit_table),
-                         [](const auto& info) { return fmt::format("Row{}", info.index); });
+                         [](const auto& row) { return fmt::format("Row{}", row.index); });
 
 std::string amount(const llmt::LimitRow& row) {
   if (row.unit == llmt::LimitUnit::bytes) return fmt::format("{} MiB", row.most / (1 << 20));

@@ -110,7 +110,7 @@ Json chain(const Json& stream, int splits) {
   for (const Json& node : nodes) (node.contains("split") ? inner : leaf) = node;
   if (inner.is_null()) throw std::runtime_error("no split in the base stream");
   inner.erase("alternate");
-  leaf.erase("alternate");
+  for (const char* part : {"alternate", "search"}) leaf.erase(part);
   nodes = Json::array();
   for (int k = 0; k < splits; ++k) {
     inner["split"]["left"] = 2 * k + 1;

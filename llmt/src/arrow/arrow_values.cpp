@@ -86,9 +86,9 @@ std::vector<bool> ArrowTable::Parts::read_valid(const Batch& batch, const Column
   std::vector<bool> valid(static_cast<std::size_t>(end - begin), true);
   if (batch.missing[static_cast<std::size_t>(&column - columns.data())] == 0) return valid;
   const std::int64_t bits = batch.body + batch.buffers[column.first_buffer][0];
-  const std::string bytes = read(bits + begin / 8, (end + 7) / 8 - begin / 8);
+  const std::string read_bits = read(bits + begin / 8, (end + 7) / 8 - begin / 8);
   for (Eigen::Index i = begin; i < end; ++i) {
-    const auto byte = static_cast<unsigned char>(bytes[static_cast<std::size_t>(i / 8 - begin / 8)]);
+    const auto byte = static_cast<unsigned char>(read_bits[static_cast<std::size_t>(i / 8 - begin / 8)]);
     valid[static_cast<std::size_t>(i - begin)] = (byte >> (i % 8) & 1) != 0;
   }
   return valid;
@@ -100,9 +100,9 @@ std::vector<std::string> ArrowTable::Parts::read_texts(const Batch& batch, std::
   std::vector<std::string> texts(static_cast<std::size_t>(end - begin));
   if (texts.empty()) return texts;
   const std::int64_t each = text == Text::small ? 4 : 8;
-  const std::string bytes = read(batch.body + batch.buffers[buffer + 1][0] + begin * each, (end - begin + 1) * each);
+  const std::string numbers = read(batch.body + batch.buffers[buffer + 1][0] + begin * each, (end - begin + 1) * each);
   const std::vector<std::int64_t> offsets =
-      text == Text::small ? offsets_of<std::int32_t>(bytes) : offsets_of<std::int64_t>(bytes);
+      text == Text::small ? offsets_of<std::int32_t>(numbers) : offsets_of<std::int64_t>(numbers);
   if (!std::ranges::is_sorted(offsets) || offsets.front() < 0 || offsets.back() > batch.buffers[buffer + 2][1]) {
     fail(fmt::format("the text of column \"{}\" is damaged", column));
   }
