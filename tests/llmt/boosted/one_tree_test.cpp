@@ -70,7 +70,8 @@ TEST(OneTree, IsTheBlendOfLocalModelsWithoutGuards) {
   }
   for (Eigen::Index i = 0; i < output.size(); ++i) {
     std::vector<double> z;
-    for (std::size_t j = 0; j < 4; ++j) z.push_back((data.inputs(i, j) - rows.inputs[j].centre) / rows.deviations[j]);
+    for (std::size_t j = 0; j < 4; ++j)
+      z.push_back((data.inputs(i, rows.columns[j]) - rows.inputs[j].centre) / rows.deviations[j]);
     EXPECT_NEAR(llmt::value_of(one->tree, z.data()), expected(i), 1e-9);
   }
   // Its guards are other ones, but the error is nearly that which fit() says.

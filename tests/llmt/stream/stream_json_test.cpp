@@ -81,7 +81,6 @@ TEST(StreamJson, AStreamThatWasLoadedGoesOnToTheSameBytes) {
   const std::string end = to_json(after(8000));
   for (const auto& [rows, says] : std::vector<Stage>{{0, {R"("first_rows":[])", R"("trees":[])"}},
                                                      {30, {R"("first_rows":[0.)", R"("trees":[])", R"("nan")"}},
-                                                     {53, {R"("first_rows":[])", R"("laid_out":0)"}},  // 50 count
                                                      {60, {R"("laid_out":0)"}},
                                                      {500, {R"("laid_out":1)", R"("times":2)"}},
                                                      {4000, {R"("split":)"}},
