@@ -194,18 +194,6 @@ TEST(DiscoverSimulate, WhatACommandDoesWrongIsSaid) {
   }
 }
 
-// Every time of the range is one that a run may take.
-TEST(DiscoverSimulate, TheLongestTimeIsAsLongAsIsSaid) {
-  const Folder folder;
-  folder.write("m.csv", "x,y\n1,2\n2,4\n3,7\n");
-  for (const char* seconds : {"9.2e9", "9.3e9", "1e10", "1e300"}) {
-    const Outcome outcome = folder.run(fmt::format(
-        "{} m.csv -t y --simulate-seconds {} --simulate 'sleep 0.2; exit 3' --parameter p=1", discover, seconds));
-    EXPECT_EQ(outcome.exit_code, 1) << seconds;
-    EXPECT_NE(outcome.err.find("it ended with exit code 3"), std::string::npos) << outcome.err;
-  }
-}
-
 // A command that writes while it reads, more than a pipe holds, does not stop either side.
 TEST(DiscoverSimulate, LongTablesPass) {
   const Folder folder;
