@@ -266,8 +266,8 @@ model = {"format": "llmt-boosted-model", "version": 1, "inputs": inputs,
                    "trees": [{"splits": [], "leaves": [leaf]}] * 300}]}
 open(sys.argv[1], "w").write(json.dumps(model))
 X = np.random.default_rng(0).uniform(size=(1000, n))
-print("ready", flush=True)
 try:
+    print("ready", flush=True)
     llmt.load(sys.argv[1]).explain(X[:1], X)
 except KeyboardInterrupt:
     print("interrupted", sum(t.name != "MainThread" for t in threading.enumerate()), flush=True)
