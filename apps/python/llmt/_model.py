@@ -115,7 +115,7 @@ class StreamModel:
     Threads may share it: the C++ object takes one call after the other.
     """
 
-    _text: str | None = None  # of a copy() whose C++ object nobody has asked for
+    _text: str = ""  # of a copy() whose C++ object nobody has asked for
 
     def __init__(self, inputs: int, outputs: int, options: dict[str, Any]) -> None:
         self._handle = _core.Stream(inputs, outputs, options)
