@@ -14,6 +14,9 @@ void ask_arrow_files(List& list, const std::string& program);
 void ask_states(List& list, const std::string& program, const std::string& self);
 int go_on_from_stream(const std::string& file);
 
+/// Files of what `llmt discover --json` found.
+void ask_found_files(List& list, const std::string& program);
+
 void ask_sums(List& list, const std::string& program);
 void ask_names(List& list, const std::string& program);
 

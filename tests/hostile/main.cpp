@@ -1,6 +1,6 @@
 // hostile_inputs LIST...: runs the programs on inputs that were made to break them, and prints a line per input with
-// its state. LIST: urdf, mechanism, model, sum, name, arrow, state, largest. The exit code is 1 if one of them does not
-// end as the threat model says: by a signal, after 5 s, beyond 1 GiB, or refused without the file's name.
+// its state. LIST: urdf, mechanism, model, sum, found, name, arrow, state, largest. The exit code is 1 if one of them
+// does not end as the threat model says: by a signal, after 5 s, beyond 1 GiB, or refused without the file's name.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -27,6 +27,7 @@ int main(int argc, char** argv) {
     if (which == "model") hostile::ask_models(list, LLMT_PROGRAM);
     if (which == "arrow") hostile::ask_arrow_files(list, LLMT_PROGRAM);
     if (which == "state") hostile::ask_states(list, LLMT_PROGRAM, self);
+    if (which == "found") hostile::ask_found_files(list, LLMT_PROGRAM);
     if (which == "sum") hostile::ask_sums(list, LLMT_PROGRAM);
     if (which == "name") hostile::ask_names(list, LLMT_PROGRAM);
   }
