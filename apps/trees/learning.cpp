@@ -75,6 +75,17 @@ void look_for_nothing_to_learn(const Csv& csv, const LearningArguments& argument
   }
 }
 
+// Says which words are taken for missing values. NA may be a country.
+void say_what_is_taken_as_missing(const std::vector<std::string>& names, const report::InputColumns& inputs) {
+  for (const report::MarkedCells& cells : inputs.marked) {
+    const bool is_alone = inputs.marked.size() == 1 && !inputs.has_other_marks;
+    warn(fmt::format("llmt: {} cell{} {} of {} {} taken as missing{}; --categorical {} takes {} for a word",
+                     cells.count, cells.count == 1 ? "" : "s", cells.text, names[cells.column],
+                     cells.count == 1 ? "is" : "are", is_alone ? "; other columns have none" : "", names[cells.column],
+                     cells.text));
+  }
+}
+
 // Says which columns are inputs although they look like names or numbers of the rows. Nothing is said of inputs that
 // were asked for.
 void look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
@@ -209,6 +220,7 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
                                     largest_input, arguments.options.max_threads);
   look_for_dominant_rows(csv, arguments, columns);
   look_for_accidental_inputs(arguments, inputs, columns.inputs);
+  say_what_is_taken_as_missing(inputs, columns.inputs);
   look_for_nothing_to_learn(csv, arguments, columns);
   LearningTable table{nullptr, arguments.options, lines_of_rows(csv)};
   FitOptions& options = table.options;
@@ -230,7 +242,8 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   add_names(command, "--inputs", arguments.inputs, "COLUMN", "What to learn from [all but targets and ignored]");
   add_names(command, "--ignore", arguments.ignored, "COLUMN", "What to leave out");
   add_names(command, "--categorical", arguments.categorical, "COLUMN",
-            "Inputs that are categories although they are written as numbers; columns of words are anyway");
+            "Inputs that are categories although they are written as numbers; columns of words are anyway. In a named "
+            "column NA, null and the like are words, and only an empty cell is missing");
   command.add_option("--weight", arguments.weight, "The weights of the rows [1 for each]")->type_name("COLUMN");
   command
       .add_option("--groups", arguments.groups,

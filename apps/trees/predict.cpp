@@ -72,7 +72,10 @@ report::Prediction predict_table(const PredictArguments& arguments, const Booste
   report::Prediction predicted = predict_values(arguments, model, inputs);
   predicted.has_leverage = false;
   for (const double distance : distance_outside(model, inputs.values)) predicted.extrapolation.push_back({distance});
-  if (arguments.interval > 0.0) predicted.bounds = bounds_of(arguments, model, predicted.values);
+  if (arguments.interval > 0.0) {
+    predicted.bounds = bounds_of(arguments, model, predicted.values);
+    predicted.bounds->uncalibrated = incomplete_rows(model, inputs.values);
+  }
   add_errors(arguments, csv, predicted);
   return predicted;
 }

@@ -58,7 +58,11 @@ auto intervals_of_sum(const BoostedModel& self, const Array& inputs, double leve
     });
   };
   auto lower = moved(-1.0);
-  return std::make_tuple(std::move(lower), moved(1.0), std::vector<Eigen::Index>());
+  std::vector<Eigen::Index> incomplete;
+  for_blocks(inputs, predicted_rows, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
+    for (const Eigen::Index row : incomplete_rows(self, block)) incomplete.push_back(first + row);
+  });
+  return std::make_tuple(std::move(lower), moved(1.0), std::move(incomplete));
 }
 
 // How far rows lie outside of the training ranges; one column, where trees have a second one.

@@ -11,7 +11,7 @@ import numpy as np
 from . import _advice, _core
 from ._base import BaseEstimator, NotFittedError, RegressorMixin
 from ._model import TextModel
-from .tables import Table, read_column, read_table, read_targets, row_labels
+from .tables import UNKNOWN, Table, read_column, read_table, read_targets, row_labels
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -93,7 +93,8 @@ class TableRegressor(RegressorMixin, BaseEstimator):
         Warns
         -----
         UserWarning
-            Of rows outside of the training ranges, for which no interval is honest. `check` says where they are.
+            Of rows outside of the training ranges, for which no interval is honest, and of rows with a missing cell or
+            a category as too few training rows had, or none. `check` says where they are.
         """
         handle = self._model().handle
         level = share("coverage", coverage)
@@ -102,12 +103,19 @@ class TableRegressor(RegressorMixin, BaseEstimator):
                 f"predict_interval needs rows that were held out, and this model has none: {self._why_no_intervals}"
             )
         values = self._table(X).values
-        lower, upper, _ = handle.intervals(values, level, self._threads())
+        lower, upper, uncalibrated = handle.intervals(values, level, self._threads())
         outside = np.flatnonzero(handle.extrapolation(values, self._threads())[:, 0] > 0)
         if len(outside):
             warnings.warn(
                 f"{len(outside)} of {len(values)} rows lie outside of the training ranges, the first is row {outside[0]}: "
                 "their intervals are not to be believed; check(X) names the columns",
+                stacklevel=2,
+            )
+        if len(uncalibrated):
+            warnings.warn(
+                f"{len(uncalibrated)} of {len(values)} rows have a missing cell or an unknown category, as too few training "
+                f"rows had, the first is row {uncalibrated[0]}: their intervals are likely too narrow; check(X) names the "
+                "columns",
                 stacklevel=2,
             )
         ends = np.stack([lower, upper], axis=1)
@@ -219,6 +227,7 @@ class TableRegressor(RegressorMixin, BaseEstimator):
             raise ValueError("eval_set must be a pair (X, y)")
         X, y = given
         rows = read_table(X, levels=table.levels, fitted_names=table.names, name="eval_set[0]").values
+        rows = np.where((rows == UNKNOWN) & [bool(of) for of in table.levels], np.nan, rows)
         judged, _ = read_targets(y)
         check_rows(len(rows), len(judged))
         judged = judged.reshape(len(judged), -1)

@@ -7,6 +7,22 @@
 namespace llmt::report {
 namespace {
 
+// Says of which inputs the rarest levels have no features: "k: 45 of 300 categories, ...". Nothing of the others.
+std::string rare_levels_text(const BoostedModel& model) {
+  std::string text;
+  for (int j = 0; j < static_cast<int>(model.num_inputs()); ++j) {
+    const InputColumn& input = model.inputs()[j];
+    const auto is_of_input = [&](const BoostedFeature& feature) { return feature.first == j; };
+    const auto with_feature = std::ranges::count_if(model.sums().front().features, is_of_input);
+    const auto rare = std::ssize(input.levels) - with_feature;
+    if (with_feature == 0 || rare <= 0) continue;
+    text += fmt::format(
+        "{}: the {} rarest of {} categories are not told from each other, only from the {} most frequent ones.\n",
+        input.name, rare, input.levels.size(), with_feature);
+  }
+  return text;
+}
+
 bool is_blend(const BoostSummary& summary) { return summary.variant == "blend"; }
 
 std::string blend_text(const std::string& target, const BoostSummary& summary) {
@@ -63,6 +79,7 @@ std::string boosted_text(const BoostedRun& run, const BoostResult& result, std::
       text += wrapped(blend_text(result.model.outputs()[o].name, result.summaries[o]), width);
     }
   }
+  text += wrapped(rare_levels_text(result.model), width);
   const bool is_of_all = std::ranges::all_of(
       result.summaries, [](const BoostSummary& summary) { return summary.held_out == summary.rows; });
   return text + wrapped(is_of_all

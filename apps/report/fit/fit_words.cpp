@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "report/fit/kinds.hpp"
@@ -135,6 +137,20 @@ void add_equal_rows(const FitResult& result, Lines& notes) {
   }
 }
 
+// " (country 139, age 2)": the inputs with missing values, those with most of them first.
+std::string columns_with_missing(const FitRun& run, const Model& model) {
+  std::vector<std::pair<Eigen::Index, std::string>> columns;
+  for (Eigen::Index j = 0; j < run.rows.inputs.cols(); ++j) {
+    const Eigen::Index count = run.rows.inputs.col(j).array().isNaN().count();
+    if (count > 0) columns.emplace_back(-count, fmt::format("{} {}", model.inputs()[j].name, count));
+  }
+  if (columns.empty()) return "";
+  std::ranges::stable_sort(columns, {}, &std::pair<Eigen::Index, std::string>::first);
+  std::vector<std::string> names;
+  for (auto& [count, name] : columns) names.push_back(std::move(name));
+  return fmt::format(" ({})", first_names(names));
+}
+
 // What was read, and what is to be known of its rows.
 void add_data(const FitRun& run, const FitResult& result, Document& words) {
   std::vector<std::string> inputs;
@@ -154,7 +170,8 @@ void add_data(const FitRun& run, const FitResult& result, Document& words) {
         "Copies of other rows: {}; they only add to the weight of the rows that they copy", result.summary.copies));
   }
   if (result.summary.missing_values > 0) {
-    words.notes.push_back(fmt::format("Missing values in the inputs: {}", result.summary.missing_values));
+    words.notes.push_back(fmt::format("Missing values in the inputs: {}{}", result.summary.missing_values,
+                                      columns_with_missing(run, result.model)));
   }
   if (run.options.loss == Loss::tukey) {
     const std::vector<Eigen::Index> rows = rows_left_out(result.summary.loss_weights, run.rows.weights);

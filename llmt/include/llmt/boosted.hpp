@@ -23,8 +23,10 @@ namespace llmt {
 /// Rows that differ, which fit_boosted() needs.
 inline constexpr Eigen::Index fewest_boosted_rows = 10;
 
-/// Levels of a categorical input that fit_boosted() takes.
-inline constexpr int most_boosted_levels = 50;
+/// Levels of a categorical input that have features of their own in fit_boosted(), the most frequent ones; the others
+/// are told from these, not from each other. With more than 800 000 rows there are 200 000 000 / rows of them, but at
+/// least 50: each takes 7 bytes a row.
+inline constexpr int most_boosted_levels = 255;
 
 struct BoostOptions {
   /// Factor on every tree. 0: 0.1 where the trees are soft, else that of the table at fit_boosted().
@@ -94,12 +96,12 @@ struct BoostResult {
 ///
 /// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
 ///
-/// Inputs may be missing (NaN). A category is taken as the indicators of its levels. Weights are as for fit(); a row of
+/// Inputs may be missing (NaN). A category is taken as the indicators of its most frequent levels,
+/// `most_boosted_levels` of them. Weights are as for fit(); a row of
 /// the weight k is k equal rows, to the byte. Up to the values of the seed, the result does not depend on the scale of
 /// outputs and inputs, nor on the number of threads, for which it is the same to the byte.
 ///
-/// Throws std::invalid_argument as fit(), for fewer than `fewest_boosted_rows` different rows, and for a categorical
-/// input of more than `most_boosted_levels` levels.
+/// Throws std::invalid_argument as fit(), and for fewer than `fewest_boosted_rows` different rows.
 BoostResult fit_boosted(const TrainingData& data, const BoostOptions& options = {}, const Progress& progress = {});
 
 }  // namespace llmt

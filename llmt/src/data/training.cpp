@@ -192,6 +192,7 @@ GivenRows rows_at(const GivenRows& given, const std::vector<Eigen::Index>& rows)
           .held_out = values_at(given.held_out, rows),
           .are_counts = given.are_counts,
           .categorical = given.categorical,
+          .empty_levels = given.empty_levels,
           .may_have_codes = given.may_have_codes,
           .loss_weights = values_at(given.loss_weights, rows),
           .numbers = numbers_at(given, rows)};

@@ -37,7 +37,10 @@ struct GivenRows {
   /// True if weights are counts: a row of weight k is k equal rows (docs/algorithms/data.md, "Row weights"). Set by
   /// checked().
   bool are_counts = false;
-  std::vector<int> categorical = {};       ///< inputs whose values are categories 0, 1, 2, ...
+  std::vector<int> categorical = {};  ///< inputs whose values are categories 0, 1, 2, ...
+  /// Of each input whose last category is that of its missing values, the number of categories; of others 0. May be
+  /// empty: all 0.
+  std::vector<std::size_t> empty_levels = {};
   bool may_have_codes = true;              ///< as TrainingData
   Eigen::VectorXd loss_weights = {};       ///< in training, not in errors, a row's weight is times this. Empty: all 1
   std::optional<RowNumbers> numbers = {};  ///< which rows are equal; none: nobody has looked

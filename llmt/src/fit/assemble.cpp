@@ -133,8 +133,7 @@ FittedPartition finish(const ChosenInputs& inputs, const Plan& plan, const Final
 }
 
 FitResult assemble(const Training& training, std::vector<std::optional<FittedPartition>> fitted) {
-  FitSummary summary{.missing_values = training.table->inputs.array().isNaN().count(),
-                     .min_leaf_samples = plan_of(training).growth.min_leaf_samples,
+  FitSummary summary{.min_leaf_samples = plan_of(training).growth.min_leaf_samples,
                      .partitions = {},
                      .quadratic = !training.table->products.empty()};
   Intervals intervals = make_intervals(training, fitted);
@@ -146,12 +145,26 @@ FitResult assemble(const Training& training, std::vector<std::optional<FittedPar
   return {make_model(training.all, std::move(partitions)), std::move(summary), std::move(intervals)};
 }
 
+namespace {
+
+Eigen::Index missing_values(const KeptRows& kept, const std::vector<std::size_t>& empty_levels) {
+  const auto inputs = kept.inputs.values.array();
+  Eigen::Index count = inputs.isNaN().count();
+  for (std::size_t j = 0; j < empty_levels.size(); ++j) {
+    if (empty_levels[j] > 0) count += (inputs.col(j) == static_cast<double>(empty_levels[j] - 1)).count();
+  }
+  return count;
+}
+
+}  // namespace
+
 FitResult with_choices(FitResult result, const PreparedRows& rows) {
   const KeptRows& kept = *rows.training->kept;
-  if (!rows.codes.taken.empty()) {
-    result.model = with_codes(result.model, rows.codes.codes);
-    result.intervals = with_codes(result.intervals, rows.codes.codes);
+  if (rows.has_positions()) {
+    result.model = with_codes(result.model, rows.codes.codes, rows.empty_levels);
+    result.intervals = with_codes(result.intervals, rows.codes.codes, rows.empty_levels);
   }
+  result.summary.missing_values = missing_values(kept, rows.empty_levels);
   result.summary.samples = learned_rows(kept);
   result.summary.copies = kept.copies;
   result.summary.repeats = kept.has_repeats;
