@@ -55,13 +55,12 @@ void add_errors(const PredictArguments& arguments, const Csv& csv, report::Predi
 }
 
 // The file's fault, not the caller's: no residuals, or too few for the level.
-Bounds bounds_of(const PredictArguments& arguments, const BoostedModel& model, const Eigen::MatrixXd& values) {
+Bounds bounds_of(const PredictArguments& arguments, const BoostedModel& model, const Eigen::MatrixXd& inputs) {
   if (!model.has_intervals()) {
     throw std::runtime_error(fmt::format("{}: the file has no held-out residuals; fit again", arguments.model));
   }
   try {
-    const Eigen::RowVectorXd widths = model.half_widths(arguments.interval).transpose();
-    return {values.rowwise() - widths, values.rowwise() + widths};
+    return model.intervals(inputs, arguments.interval, arguments.threads);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
   }
@@ -72,7 +71,7 @@ report::Prediction predict_table(const PredictArguments& arguments, const Booste
   report::Prediction predicted = predict_values(arguments, model, inputs);
   predicted.has_leverage = false;
   for (const double distance : distance_outside(model, inputs.values)) predicted.extrapolation.push_back({distance});
-  if (arguments.interval > 0.0) predicted.bounds = bounds_of(arguments, model, predicted.values);
+  if (arguments.interval > 0.0) predicted.bounds = bounds_of(arguments, model, inputs.values);
   add_errors(arguments, csv, predicted);
   return predicted;
 }

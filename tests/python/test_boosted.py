@@ -212,7 +212,7 @@ def test_intervals_have_one_width_and_hold_about_what_they_promise():
     np.testing.assert_allclose(ends.mean(axis=1), fitted.predict(new), atol=1e-12)
     # 200 residuals: 0.9 within 3 sqrt(0.9 * 0.1 / 200)
     assert 0.84 < ((observed >= ends[:, 0]) & (observed <= ends[:, 1])).mean() < 0.96
-    with pytest.raises(ValueError, match="too few for the level"):
+    with pytest.raises(ValueError, match="needs at least 999 held-out rows"):
         fitted.predict_interval(X, coverage=0.999)
 
 

@@ -51,14 +51,15 @@ auto predict_by_sum(const BoostedModel& self, const Array& inputs, int threads) 
 
 // Lower and upper ends; no row is apart, as those of trees that lack an input are.
 auto intervals_of_sum(const BoostedModel& self, const Array& inputs, double level, int threads) {
-  const Eigen::RowVectorXd widths = self.half_widths(level).transpose();
-  const auto moved = [&](double sign) {
-    return stacked<double>(inputs, self.num_outputs(), [&](const Eigen::MatrixXd& block) -> Eigen::MatrixXd {
-      return self.predict(block, threads).rowwise() + sign * widths;
-    });
-  };
-  auto lower = moved(-1.0);
-  return std::make_tuple(std::move(lower), moved(1.0), std::vector<Eigen::Index>());
+  const Eigen::Index rows = static_cast<Eigen::Index>(inputs.shape(0));
+  Bounds bounds{Eigen::MatrixXd(rows, self.num_outputs()), Eigen::MatrixXd(rows, self.num_outputs())};
+  for_blocks(inputs, predicted_rows, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
+    const Bounds part = self.intervals(block, level, threads);
+    bounds.lower.middleRows(first, block.rows()) = part.lower;
+    bounds.upper.middleRows(first, block.rows()) = part.upper;
+  });
+  return std::make_tuple(array_of<double>(std::move(bounds.lower)), array_of<double>(std::move(bounds.upper)),
+                         bounds.uncalibrated);
 }
 
 // How far rows lie outside of the training ranges; one column, where trees have a second one.

@@ -91,7 +91,7 @@ struct BoostResult {
 /// the whole procedure, shares and number of trees chosen without the row. With more rows it is the mean of the sum and
 /// such a tree where the tree alone is better than the sum on the held-out rows.
 ///
-/// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
+/// BoostedModel::intervals() gives intervals, from the held-out rows' residuals and their spread.
 ///
 /// Inputs may be missing (NaN). A category is taken as the indicators of its levels. Weights are as for fit(); a row of
 /// the weight k is k equal rows, to the byte. Up to the values of the seed, the result does not depend on the scale of

@@ -184,7 +184,7 @@ std::vector<int> with_codes(std::vector<int> categorical, const Codes& codes) {
 Intervals with_codes(const Intervals& intervals, const Codes& codes) {
   std::vector<Model> models;
   for (const Model& model : intervals.models()) models.push_back(with_codes(model, codes));
-  return {std::move(models), intervals.residuals(), intervals.incomplete_residuals()};
+  return {std::move(models), intervals.parts()};
 }
 
 }  // namespace llmt
