@@ -87,7 +87,8 @@ report::Prediction predict_table(const PredictArguments& arguments, const ModelW
           "{}: the file has no held-out residuals; fit without --no-intervals and with folds", arguments.model));
     }
     try {
-      predicted.bounds = file.intervals.predict(inputs.values, arguments.interval, arguments.threads);
+      predicted.bounds =
+          holding(file.intervals.predict(inputs.values, arguments.interval, arguments.threads), predicted.values);
     } catch (const std::invalid_argument& error) {  // too few rows for the level: the model's fault, not the caller's
       throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
     }

@@ -65,7 +65,7 @@ auto intervals(const ModelWithIntervals& self, const Array& inputs, double level
   const Eigen::Index rows = static_cast<Eigen::Index>(inputs.shape(0));
   Bounds bounds{Eigen::MatrixXd(rows, self.model.num_outputs()), Eigen::MatrixXd(rows, self.model.num_outputs())};
   for_blocks(inputs, judged_rows, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
-    const Bounds part = self.intervals.predict(block, level, threads);
+    const Bounds part = holding(self.intervals.predict(block, level, threads), self.model.predict(block, threads));
     bounds.lower.middleRows(first, block.rows()) = part.lower;
     bounds.upper.middleRows(first, block.rows()) = part.upper;
     for (const Eigen::Index row : part.uncalibrated) bounds.uncalibrated.push_back(first + row);

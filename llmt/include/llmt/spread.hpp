@@ -5,6 +5,9 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "llmt/abi.hpp"
+#include "llmt/partition.hpp"
+
 namespace llmt {
 
 /// A node of a spread: a split, or a leaf.
@@ -34,9 +37,8 @@ struct Spread {
 double spread_at(const Spread& spread, const Eigen::Ref<const Eigen::MatrixXd>& inputs, Eigen::Index row,
                  double prediction);
 
-/// Throws std::invalid_argument if a spread does not fit inputs with these numbers of levels (0: a number): a number of
-/// lists or of values, a tree that is none, a column out of range, a number that is not finite, a factor that is not
+/// Throws std::invalid_argument if a spread does not fit a model with these inputs: a number of lists or of values, a tree that is none, a column out of range, a number that is not finite, a factor that is not
 /// positive or beyond a million.
-void check_spread(const Spread& spread, const std::vector<Eigen::Index>& levels);
+void check_spread(const Spread& spread, const std::vector<InputColumn>& inputs);
 
 }  // namespace llmt

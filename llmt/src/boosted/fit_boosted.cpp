@@ -5,7 +5,7 @@
 #include "boosted/average.hpp"
 #include "boosted/race.hpp"
 #include "llmt/boosted.hpp"
-#include "model/fit_spread.hpp"
+#include "spread/fit_spread.hpp"
 
 namespace llmt {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "model/fit_spread.hpp"
+#include "spread/fit_spread.hpp"
 #include "model/incomplete.hpp"
 
 namespace llmt {

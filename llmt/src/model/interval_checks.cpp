@@ -54,12 +54,6 @@ std::string difference_of_columns(const Model& one, const Model& other) {
   return "";
 }
 
-std::vector<Eigen::Index> counts_of_levels(const std::vector<InputColumn>& inputs) {
-  std::vector<Eigen::Index> counts;
-  for (const InputColumn& input : inputs) counts.push_back(std::ssize(input.levels));
-  return counts;
-}
-
 void check_belong(const std::vector<Model>& folds, const Model& model) {
   for (std::size_t k = 0; k < folds.size(); ++k) {
     const Model& fold = folds[k];

@@ -11,7 +11,7 @@
 #include "model/codes.hpp"
 #include "model/incomplete.hpp"
 #include "model/interval_checks.hpp"
-#include "model/scaled_residuals.hpp"
+#include "spread/scaled_residuals.hpp"
 
 namespace llmt {
 namespace {
@@ -135,7 +135,7 @@ Intervals::Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts)
     if (!part.spreads.empty() && std::ssize(part.spreads) != model.num_outputs()) {
       refuse(fmt::format("part {} has {} spreads for {} outputs", p, part.spreads.size(), model.num_outputs()));
     }
-    for (const Spread& spread : part.spreads) check_spread(spread, counts_of_levels(model.inputs()));
+    for (const Spread& spread : part.spreads) check_spread(spread, model.inputs());
   }
   if (std::ranges::count(has_part, false) > 0) {
     refuse(fmt::format("{} models and {} matrices of residuals", models_.size(), parts_.size()));

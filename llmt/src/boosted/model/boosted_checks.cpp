@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "llmt/limits.hpp"
-#include "model/interval_checks.hpp"
 
 namespace llmt {
 namespace {
@@ -144,7 +143,7 @@ void check_boosted(const std::vector<InputColumn>& inputs, const std::vector<Out
       const std::string of_part = fmt::format("{}/held_out/{}", pointer, p);
       check_residuals(sum.held_out[p].residuals, of_part);
       try {
-        check_spread(sum.held_out[p].spread, counts_of_levels(inputs));
+        check_spread(sum.held_out[p].spread, inputs);
       } catch (const std::invalid_argument& error) {
         fail(of_part, error.what());
       }

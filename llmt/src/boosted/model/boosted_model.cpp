@@ -14,7 +14,7 @@
 #include "boosted/model/boosted_checks.hpp"
 #include "boosted/model/symmetric_table.hpp"
 #include "boosted/model/transition.hpp"
-#include "model/scaled_residuals.hpp"
+#include "spread/scaled_residuals.hpp"
 
 namespace llmt {
 namespace {

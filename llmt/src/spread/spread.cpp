@@ -13,14 +13,15 @@ constexpr double largest_factor = 1e6;
 
 [[noreturn]] void refuse(const std::string& problem) { throw std::invalid_argument("llmt::Spread: " + problem); }
 
-void check_levels(const Spread& spread, const std::vector<Eigen::Index>& levels) {
-  if (spread.levels.size() != levels.size()) {
-    refuse(fmt::format("{} lists of levels for {} inputs", spread.levels.size(), levels.size()));
+void check_levels(const Spread& spread, const std::vector<InputColumn>& inputs) {
+  if (spread.levels.size() != inputs.size()) {
+    refuse(fmt::format("{} lists of levels for {} inputs", spread.levels.size(), inputs.size()));
   }
-  for (std::size_t j = 0; j < levels.size(); ++j) {
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
+    const std::size_t levels = inputs[j].levels.size();
     const std::vector<double>& values = spread.levels[j];
-    if (std::ssize(values) != (levels[j] > 0 ? levels[j] + 1 : 0)) {
-      refuse(fmt::format("{} values of input {}, which has {} levels", values.size(), j, levels[j]));
+    if (values.size() != (levels > 0 ? levels + 1 : 0)) {
+      refuse(fmt::format("{} values of input {}, which has {} levels", values.size(), j, levels));
     }
     if (!std::ranges::all_of(values, [](double value) { return std::isfinite(value); })) {
       refuse(fmt::format("a value of a level of input {} is not finite", j));
@@ -50,12 +51,12 @@ double spread_at(const Spread& spread, const Eigen::Ref<const Eigen::MatrixXd>& 
   return node->factor;
 }
 
-void check_spread(const Spread& spread, const std::vector<Eigen::Index>& levels) {
+void check_spread(const Spread& spread, const std::vector<InputColumn>& inputs) {
   if (spread.nodes.empty()) {
     if (!spread.levels.empty()) refuse("it has levels and no nodes");
     return;
   }
-  check_levels(spread, levels);
+  check_levels(spread, inputs);
   const auto count = static_cast<int>(spread.nodes.size());
   std::vector<int> parents(spread.nodes.size(), 0);
   for (int i = 0; i < count; ++i) {
@@ -66,7 +67,7 @@ void check_spread(const Spread& spread, const std::vector<Eigen::Index>& levels)
       }
       continue;
     }
-    if (node.column < 0 || node.column > std::ssize(levels) || !std::isfinite(node.threshold)) {
+    if (node.column < 0 || node.column > std::ssize(inputs) || !std::isfinite(node.threshold)) {
       refuse(fmt::format("node {} has no such column, or no threshold", i));
     }
     for (const int child : {node.left, node.right}) {

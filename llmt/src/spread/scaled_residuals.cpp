@@ -1,10 +1,13 @@
-#include "model/scaled_residuals.hpp"
+#include "spread/scaled_residuals.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <vector>
+
+#include "llmt/bounds.hpp"
 
 namespace llmt {
 namespace {
@@ -57,6 +60,12 @@ double largest_value(std::span<const ScaledResiduals> parts, Eigen::Index rank) 
     }
     if (left > at_least) left -= at_least;
   }
+}
+
+Bounds holding(Bounds bounds, const Eigen::Ref<const Eigen::MatrixXd>& predictions) {
+  bounds.lower = bounds.lower.cwiseMin(predictions);
+  bounds.upper = bounds.upper.cwiseMax(predictions);
+  return bounds;
 }
 
 Eigen::Index values_outside(double level, Eigen::Index rows) {

@@ -1,4 +1,4 @@
-#include "model/fit_spread.hpp"
+#include "spread/fit_spread.hpp"
 
 #include <algorithm>
 #include <cmath>
