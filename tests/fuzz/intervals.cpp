@@ -9,9 +9,8 @@
 namespace fuzz_intervals {
 namespace {
 
-const std::vector<std::string> words = {"",          "x1",    "y", "model", "residuals", "residuals_incomplete",
-                                        "intervals", "format",
-                                        "parts",     "spread", "nodes", "levels"};
+const std::vector<std::string> words = {"",          "x1",     "y",     "model",  "residuals", "residuals_incomplete",
+                                        "intervals", "format", "parts", "spread", "nodes",     "levels"};
 
 }  // namespace
 

@@ -18,8 +18,8 @@ struct Bounds {
   std::vector<Eigen::Index> uncalibrated = {};
 };
 
-/// The bounds, widened where needed so that they hold the predictions of the model. Folds' models may all lie on one side
-/// of it.
+/// The bounds, widened where needed so that they hold the predictions of the model. Folds' models may all lie on one
+/// side of it.
 Bounds holding(Bounds bounds, const Eigen::Ref<const Eigen::MatrixXd>& predictions);
 
 }  // namespace llmt

@@ -23,6 +23,9 @@ struct HeldOutPart {
   Eigen::MatrixXd residuals;   ///< rows x outputs: absolute residuals, each divided by the spread at its row; ascending
   Eigen::MatrixXd incomplete;  ///< the same of the rows that lack an input
   std::vector<Spread> spreads = {};  ///< one an output, learnt from the other parts; empty: 1 everywhere
+  /// One an output: (I.3) of docs/algorithms/intervals.md, by how much the folds' models usually disagree, as a part of
+  /// the spread. Empty: by nothing, as a single model.
+  std::vector<double> disagreement = {};
 };
 
 /// Normalised CV+ prediction intervals (Barber, Candes, Ramdas & Tibshirani 2021; Lei et al. 2018): with f_k(i) the

@@ -37,8 +37,9 @@ struct Spread {
 double spread_at(const Spread& spread, const Eigen::Ref<const Eigen::MatrixXd>& inputs, Eigen::Index row,
                  double prediction);
 
-/// Throws std::invalid_argument if a spread does not fit a model with these inputs: a number of lists or of values, a tree that is none, a column out of range, a number that is not finite, a factor that is not
-/// positive or beyond a million.
+/// Throws std::invalid_argument if a spread does not fit a model with these inputs: a number of lists or of values, a
+/// tree that is none, a column out of range, a number that is not finite, a factor that is not positive or beyond a
+/// million.
 void check_spread(const Spread& spread, const std::vector<InputColumn>& inputs);
 
 }  // namespace llmt

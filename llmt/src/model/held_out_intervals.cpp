@@ -1,10 +1,11 @@
 #include "model/held_out_intervals.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
-#include "spread/fit_spread.hpp"
 #include "model/incomplete.hpp"
+#include "spread/fit_spread.hpp"
 
 namespace llmt {
 namespace {
@@ -26,6 +27,28 @@ std::vector<Place> places_of(const std::vector<std::span<const int>>& held_out) 
   return places;
 }
 
+// The square root of (K - 1) / K, for K models, times what each prediction differs from the mean of the other models':
+// the variance of this is that of one model.
+Eigen::MatrixXd differences_of_folds(const Eigen::MatrixXd& predictions, const std::vector<Eigen::MatrixXd>& by_model) {
+  const auto count = static_cast<double>(by_model.size());
+  if (by_model.size() < 2) return Eigen::MatrixXd::Zero(predictions.rows(), predictions.cols());
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(predictions.rows(), predictions.cols());
+  for (const Eigen::MatrixXd& each : by_model) mean += each / count;
+  // f_k - mean of others = (f_k - mean of all) K / (K - 1)
+  return (predictions - mean) * std::sqrt(count / (count - 1.0));
+}
+
+// The deviation of normal numbers with this median size. A mean would be that of the few rows that are far from others.
+double usual_size(const Eigen::VectorXd& differences) {
+  constexpr double median_of_normal = 0.6744897501960817;
+  if (differences.size() == 0) return 0.0;
+  std::vector<double> sizes;
+  for (const double difference : differences) sizes.push_back(std::abs(difference));
+  const auto middle = sizes.begin() + std::ssize(sizes) / 2;
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return *middle / median_of_normal;
+}
+
 }  // namespace
 
 Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
@@ -44,21 +67,23 @@ Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const E
   }
   parts = std::max(parts, static_cast<int>(models.size()));
   const Eigen::MatrixXd x = inputs(rows, Eigen::all);
+  std::vector<Eigen::MatrixXd> by_model;
+  for (const Model& model : models) by_model.push_back(model.predict(x, max_threads));
   Eigen::MatrixXd predictions(count, outputs.cols());
-  Eigen::Index begin = 0;
-  for (std::size_t f = 0; f < models.size(); ++f) {
-    const Eigen::Index size = std::ssize(held_out[f]);
-    predictions.middleRows(begin, size) = models[f].predict(x.middleRows(begin, size), max_threads);
-    begin += size;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    predictions.row(i) = by_model[models.size() == 1 ? 0 : static_cast<std::size_t>(part[i])].row(i);
   }
   Eigen::MatrixXd residuals = (outputs(rows, Eigen::all) - predictions).cwiseAbs();
+  Eigen::MatrixXd differences = differences_of_folds(predictions, by_model);
   std::vector<std::vector<Spread>> spreads(parts);
   bool has_spread = false;
   for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
     const std::vector<Spread> of_output =
         fit_spreads({x, models.front().inputs(), predictions.col(o), residuals.col(o)}, part, parts);
     for (Eigen::Index i = 0; i < count; ++i) {
-      residuals(i, o) /= spread_at(of_output[part[i]], x, i, predictions(i, o));
+      const double spread = spread_at(of_output[part[i]], x, i, predictions(i, o));
+      residuals(i, o) /= spread;
+      differences(i, o) /= spread;
     }
     for (int p = 0; p < parts; ++p) {
       has_spread = has_spread || !of_output[p].nodes.empty();
@@ -71,8 +96,17 @@ Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const E
   for (Eigen::Index i = 0; i < count; ++i) (incomplete[i] ? lacking : whole)[part[i]].push_back(static_cast<int>(i));
   std::vector<HeldOutPart> made;
   for (int p = 0; p < parts; ++p) {
-    made.push_back({models.size() == 1 ? 0 : static_cast<std::size_t>(p), residuals(whole[p], Eigen::all),
-                    residuals(lacking[p], Eigen::all), has_spread ? std::move(spreads[p]) : std::vector<Spread>()});
+    HeldOutPart& of_part = made.emplace_back();
+    of_part.model = models.size() == 1 ? 0 : static_cast<std::size_t>(p);
+    of_part.residuals = residuals(whole[p], Eigen::all);
+    of_part.incomplete = residuals(lacking[p], Eigen::all);
+    if (has_spread) of_part.spreads = std::move(spreads[p]);
+    if (models.size() > 1 && count >= fewest_rows_of_spread) {
+      whole[p].insert(whole[p].end(), lacking[p].begin(), lacking[p].end());
+      for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
+        of_part.disagreement.push_back(usual_size(differences.col(o)(whole[p])));
+      }
+    }
   }
   return {std::move(models), std::move(made)};
 }

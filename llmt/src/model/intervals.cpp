@@ -52,6 +52,36 @@ struct Estimate {
   double spread;
 };
 
+// By how much the models usually disagree as a part of the spread, squared, for each output.
+Eigen::VectorXd usual_disagreement(const std::vector<HeldOutPart>& parts, Eigen::Index outputs) {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(outputs);
+  for (const HeldOutPart& part : parts) {
+    for (std::size_t o = 0; o < part.disagreement.size(); ++o) {
+      squares(static_cast<Eigen::Index>(o)) += part.disagreement[o] * part.disagreement[o];
+    }
+  }
+  return squares / static_cast<double>(parts.size());
+}
+
+// Leaves of the disagreement of the folds' models what is beyond the usual one, which the residuals hold already,
+// (I.4).
+void draw_together(std::vector<Estimate>& estimates, double usual) {
+  if (usual <= 0.0) return;
+  const auto count = static_cast<double>(estimates.size());
+  double mean = 0.0;
+  double expected = 0.0;
+  for (const Estimate& estimate : estimates) {
+    mean += estimate.prediction / count;
+    expected += usual * estimate.spread * estimate.spread / count;
+  }
+  double variance = 0.0;
+  for (const Estimate& estimate : estimates) {
+    variance += (estimate.prediction - mean) * (estimate.prediction - mean) / (count - 1.0);
+  }
+  const double left = variance > expected ? std::sqrt(1.0 - expected / variance) : 0.0;
+  for (Estimate& estimate : estimates) estimate.prediction = mean + left * (estimate.prediction - mean);
+}
+
 // `estimates`: of each part.
 Interval interval_at(const std::vector<HeldOutPart>& parts, const std::vector<Estimate>& estimates,
                      const Calibration& calibration, Eigen::Index output) {
@@ -99,6 +129,15 @@ void check_and_sort(Eigen::MatrixXd& residuals, std::size_t part, Eigen::Index o
   for (Eigen::Index o = 0; o < outputs; ++o) std::sort(residuals.col(o).begin(), residuals.col(o).end());
 }
 
+void check_disagreement(const std::vector<double>& disagreement, std::size_t part, Eigen::Index outputs,
+                        std::size_t models) {
+  const auto is_size = [](double value) { return value >= 0.0 && std::isfinite(value); };
+  if (models < 2 || std::ssize(disagreement) != outputs || !std::ranges::all_of(disagreement, is_size)) {
+    refuse(fmt::format("the disagreement of part {} is not one number of at least 0 for each of {} outputs", part,
+                       outputs));
+  }
+}
+
 std::vector<HeldOutPart> parts_of(std::vector<Eigen::MatrixXd> residuals, std::vector<Eigen::MatrixXd> incomplete) {
   if (!incomplete.empty() && incomplete.size() != residuals.size()) {
     refuse(fmt::format("{} and {} matrices of residuals", residuals.size(), incomplete.size()));
@@ -135,6 +174,7 @@ Intervals::Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts)
     if (!part.spreads.empty() && std::ssize(part.spreads) != model.num_outputs()) {
       refuse(fmt::format("part {} has {} spreads for {} outputs", p, part.spreads.size(), model.num_outputs()));
     }
+    if (!part.disagreement.empty()) check_disagreement(part.disagreement, p, model.num_outputs(), models_.size());
     for (const Spread& spread : part.spreads) check_spread(spread, model.inputs());
   }
   if (std::ranges::count(has_part, false) > 0) {
@@ -161,12 +201,13 @@ Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, doubl
   const std::vector<Calibration> of_incomplete =
       calibrations_of(parts_, &HeldOutPart::incomplete, &HeldOutPart::residuals, level);
   const std::vector<bool> incomplete = incomplete_rows(models_, inputs);
+  const Eigen::VectorXd usual = usual_disagreement(parts_, predicted[0].cols());
   const Eigen::MatrixXd at = at_positions(models_[0].inputs(), inputs);
   const Eigen::Index outputs = predicted[0].cols();
   Bounds bounds{Eigen::MatrixXd(inputs.rows(), outputs), Eigen::MatrixXd(inputs.rows(), outputs)};
   constexpr Eigen::Index block = 256;
   parallel_for((inputs.rows() + block - 1) / block, max_threads, [&](Eigen::Index index) {
-    std::vector<Estimate> estimates(parts_.size());
+    std::vector<Estimate> estimates(parts_.size());  // of each part
     for (Eigen::Index row = index * block; row < std::min(inputs.rows(), (index + 1) * block); ++row) {
       for (Eigen::Index o = 0; o < outputs; ++o) {
         for (std::size_t p = 0; p < parts_.size(); ++p) {
@@ -174,6 +215,7 @@ Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, doubl
           const std::vector<Spread>& spreads = parts_[p].spreads;
           estimates[p] = {prediction, spreads.empty() ? 1.0 : spread_at(spreads[o], at, row, prediction)};
         }
+        draw_together(estimates, usual[o]);
         const auto [lower, upper] = hull_at(parts_, estimates, incomplete[row] ? of_incomplete : of_complete, o);
         bounds.lower(row, o) = lower;
         bounds.upper(row, o) = upper;

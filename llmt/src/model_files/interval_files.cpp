@@ -40,6 +40,7 @@ HeldOutPart part_from(const JsonReader& json, std::size_t model) {
   HeldOutPart part{.model = model, .residuals = residuals_from(json.member("residuals")), .incomplete = {}};
   part.incomplete =
       json.has(of_incomplete) ? residuals_from(json.member(of_incomplete)) : Eigen::MatrixXd(0, part.residuals.cols());
+  if (json.has("disagreement")) part.disagreement = json.member("disagreement").list<double>();
   if (!json.has("spread")) return part;
   for (const JsonReader& spread : json.member("spread").elements()) part.spreads.push_back(spread_from(spread));
   return part;
@@ -48,6 +49,7 @@ HeldOutPart part_from(const JsonReader& json, std::size_t model) {
 Json json_of(const HeldOutPart& part) {
   Json json = {{"residuals", lists_of(part.residuals)}};
   if (part.incomplete.rows() > 0) json[of_incomplete] = lists_of(part.incomplete);
+  if (!part.disagreement.empty()) json["disagreement"] = part.disagreement;
   for (const Spread& spread : part.spreads) json["spread"].push_back(json_of(spread));
   return json;
 }
@@ -75,7 +77,7 @@ Intervals intervals_from(const JsonReader& folds, const Model& model) {
 
 // Whether a fold is written as programs before spreads read it. Those find no residuals where it is not.
 bool is_plain(const std::vector<HeldOutPart>& of_fold) {
-  return of_fold.size() == 1 && of_fold.front().spreads.empty();
+  return of_fold.size() == 1 && of_fold.front().spreads.empty() && of_fold.front().disagreement.empty();
 }
 
 }  // namespace

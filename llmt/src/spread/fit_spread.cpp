@@ -132,9 +132,7 @@ class Grower {
  private:
   double mean_error(const std::vector<int>& rows) const { return errors_(rows).mean(); }
 
-  Sums sums_of(const std::vector<int>& rows) const {
-    return {static_cast<double>(rows.size()), logs_(rows).sum()};
-  }
+  Sums sums_of(const std::vector<int>& rows) const { return {static_cast<double>(rows.size()), logs_(rows).sum()}; }
 
   Leaf leaf_of(std::vector<int> rows, double of_parent) const {
     const double count = static_cast<double>(rows.size());

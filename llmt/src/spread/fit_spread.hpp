@@ -21,11 +21,11 @@ inline constexpr int parts_of_one_fold = 5;
 struct ErrorRows {
   Eigen::Ref<const Eigen::MatrixXd> inputs;  ///< rows x inputs, categories as positions
   const std::vector<InputColumn>& columns;   ///< of the inputs
-  Eigen::VectorXd predictions;                      ///< of each row, of the model that has not seen it
-  Eigen::VectorXd errors;                           ///< absolute ones
+  Eigen::VectorXd predictions;               ///< of each row, of the model that has not seen it
+  Eigen::VectorXd errors;                    ///< absolute ones
 };
 
-/// One spread for each of `parts` parts, (I.4) of docs/algorithms/intervals.md, learnt from the rows of the other
+/// One spread for each of `parts` parts, (I.1) of docs/algorithms/intervals.md, learnt from the rows of the other
 /// parts. `part`: of each row. Spreads without nodes if the rows are too few, or the errors of some part are all zero.
 std::vector<Spread> fit_spreads(const ErrorRows& rows, const std::vector<int>& part, int parts);
 

@@ -19,8 +19,12 @@ struct Window {
   std::size_t end;
 
   // The first index in the window whose value is at least `value`, or above it.
-  std::size_t first_at_least(double value) const { return first([&](double other) { return other >= value; }); }
-  std::size_t first_above(double value) const { return first([&](double other) { return other > value; }); }
+  std::size_t first_at_least(double value) const {
+    return first([&](double other) { return other >= value; });
+  }
+  std::size_t first_above(double value) const {
+    return first([&](double other) { return other > value; });
+  }
 
  private:
   template <class Test>

@@ -215,8 +215,9 @@ TEST(BoostedModel, HasHalfWidthsThatAreOrderStatisticsOfResiduals) {
   EXPECT_THROW(with({{{2.0, 1.0}}}), std::invalid_argument);
   EXPECT_THROW(with({{{-1.0}}}), std::invalid_argument);
   // Two parts: the second one says that errors are four times as large where x > 0.5.
-  const llmt::Spread spread{.nodes = {{.column = 0, .threshold = 0.5, .left = 1, .right = 2}, {.factor = 0.5}, {.factor = 2.0}},
-                            .levels = {{}}};
+  const llmt::Spread spread{
+      .nodes = {{.column = 0, .threshold = 0.5, .left = 1, .right = 2}, {.factor = 0.5}, {.factor = 2.0}},
+      .levels = {{}}};
   const llmt::BoostedModel two = with({{{1, 2, 3, 4, 5}}, {{2, 4, 6, 8}, spread}});
   EXPECT_EQ(half_width(two, 0.5, 0.5), 3.0);  // 1 1 2 2 3 3 4 4 5
   EXPECT_EQ(half_width(two, 0.5, 0.6), 5.0);  // 1 2 3 4 4 5 8 12 16
@@ -343,7 +344,8 @@ TEST(BoostedFile, SaysWhereItIsWrong) {
   for (int slope = 0; slope <= llmt::most_leaf_slopes; ++slope) steep.insert(steep.end(), {0, 1.0});
   expect_fault(changed("/sums/0/trees/0/leaves/0", steep), "more than 12 slopes");
   expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 1.0, 2.0, -1, 1.0}), "there is no feature -1");
-  expect_fault(changed("/sums/0/residuals", {1.0, 2.0, -1.0}), "/sums/0/held_out/0/residuals/2: residuals are not finite");
+  expect_fault(changed("/sums/0/residuals", {1.0, 2.0, -1.0}),
+               "/sums/0/held_out/0/residuals/2: residuals are not finite");
   expect_fault(changed("/sums/1", Json::object()), "/sums/1");
   expect_fault("{}", "not a file of a boosted model");
 }

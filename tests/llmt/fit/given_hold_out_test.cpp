@@ -127,8 +127,7 @@ TEST(GivenHoldOut, IntervalsAreOfItsResiduals) {
     EXPECT_EQ(part.model, 0U);
     for (const double residual : part.residuals.reshaped()) {
       for (Eigen::Index row = 0; row < 150; ++row) {
-        const double spread =
-            part.spreads.empty() ? 1.0 : llmt::spread_at(part.spreads[0], x, row, predicted(row, 0));
+        const double spread = part.spreads.empty() ? 1.0 : llmt::spread_at(part.spreads[0], x, row, predicted(row, 0));
         if (residual == std::abs(outputs(row, 0) - predicted(row, 0)) / spread) is_found[row] = true;
       }
     }

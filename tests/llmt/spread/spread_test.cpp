@@ -12,10 +12,10 @@
 #include "llmt/boosted.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
-#include "spread/fit_spread.hpp"
-#include "spread/scaled_residuals.hpp"
 #include "oracles/samples.hpp"
 #include "oracles/thrown.hpp"
+#include "spread/fit_spread.hpp"
+#include "spread/scaled_residuals.hpp"
 
 namespace {
 
@@ -71,11 +71,9 @@ void expect_held(const Fifths& fifths) {
 }
 
 TEST(Spread, WidthsOfATreeFollowTheNoise) {
-  expect_held(fifths_of(
-      [](const Sample& train, const Eigen::MatrixXd& x) {
-        return llmt::fit(train.x, train.y).intervals.predict(x, 0.9);
-      },
-      3));
+  expect_held(fifths_of([](const Sample& train,
+                           const Eigen::MatrixXd& x) { return llmt::fit(train.x, train.y).intervals.predict(x, 0.9); },
+                        3));
 }
 
 TEST(Spread, WidthsOfOneFoldFollowTheNoise) {
