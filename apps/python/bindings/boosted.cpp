@@ -62,6 +62,13 @@ auto intervals_of_sum(const BoostedModel& self, const Array& inputs, double leve
                          bounds.uncalibrated);
 }
 
+auto quantiles_of_sum(const BoostedModel& self, const Array& inputs, const std::vector<double>& probabilities,
+                      int threads) {
+  return stacked_quantiles(inputs, self.num_outputs(), probabilities, [&](const Eigen::MatrixXd& block) {
+    return quantiles(self, block, probabilities, threads);
+  });
+}
+
 // How far rows lie outside of the training ranges; one column, where trees have a second one.
 auto extrapolation_of_sum(const BoostedModel& self, const Array& inputs) {
   return stacked<double>(inputs, 1, [&](const Eigen::MatrixXd& block) -> Eigen::MatrixXd {
@@ -134,6 +141,7 @@ void add_boosted(nb::module_& module) {
           [](const Self& self, const Array& inputs, int) { return extrapolation_of_sum(self, inputs); },
           nb::arg("inputs"), nb::arg("threads") = 0)
       .def("intervals", &intervals_of_sum, nb::arg("inputs"), nb::arg("level"), nb::arg("threads") = 0)
+      .def("quantiles", &quantiles_of_sum, nb::arg("inputs"), nb::arg("probabilities"), nb::arg("threads") = 0)
       .def("attribute", &attribute_to_sum, nb::arg("inputs"), nb::arg("background"), nb::arg("threads") = 0)
       .def("importance", &importance_in_sum, nb::arg("inputs"), nb::arg("threads") = 0)
       .def("partial_dependence", &partial_dependence_of, nb::arg("inputs"), nb::arg("input"), nb::arg("values"),

@@ -74,6 +74,13 @@ auto intervals(const ModelWithIntervals& self, const Array& inputs, double level
                          bounds.uncalibrated);
 }
 
+auto quantiles_of(const ModelWithIntervals& self, const Array& inputs, const std::vector<double>& probabilities,
+                  int threads) {
+  return stacked_quantiles(inputs, self.model.num_outputs(), probabilities, [&](const Eigen::MatrixXd& block) {
+    return quantiles(self, block, probabilities, threads);
+  });
+}
+
 // Contributions of all rows, one matrix (rows x inputs) for each output, and the prediction at the reference.
 auto attribute_rows(const ModelWithIntervals& self, const Array& inputs) {
   const Model& model = self.model;
@@ -125,6 +132,7 @@ void add_models(nb::module_& module) {
       .def("validities", &validities, nb::arg("inputs"), nb::arg("partition"), nb::arg("threads") = 0)
       .def("extrapolation", &extrapolation, nb::arg("inputs"), nb::arg("threads") = 0)
       .def("intervals", &intervals, nb::arg("inputs"), nb::arg("level"), nb::arg("threads") = 0)
+      .def("quantiles", &quantiles_of, nb::arg("inputs"), nb::arg("probabilities"), nb::arg("threads") = 0)
       .def("attribute", &attribute_rows, nb::arg("inputs"))
       .def("importance", &importance_of, nb::arg("inputs"), nb::arg("threads") = 0)
       .def("to_c", &c_source, nb::arg("name"))

@@ -47,12 +47,21 @@ class BoostedModel {
   /// there are no residuals, too few for the level, or if the level is not between 0 and 1, and as predict().
   Bounds intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0) const;
 
+  /// The same for several levels.
+  std::vector<Bounds> intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<double>& levels,
+                                int max_threads = 0) const;
+
  private:
   std::vector<InputColumn> inputs_;
   std::vector<OutputColumn> outputs_;
   std::vector<double> deviations_;
   std::vector<BoostedSum> sums_;
 };
+
+/// Quantiles of each output, rows x probabilities; see quantiles_from(). Throws std::invalid_argument as
+/// levels_of_quantiles() and BoostedModel::intervals().
+std::vector<Eigen::MatrixXd> quantiles(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                       const std::vector<double>& probabilities, int max_threads = 0);
 
 /// How large a model is, over all outputs.
 struct BoostedSize {

@@ -22,4 +22,15 @@ struct Bounds {
 /// side of it.
 Bounds holding(Bounds bounds, const Eigen::Ref<const Eigen::MatrixXd>& predictions);
 
+/// The levels |1 - 2 p| of the intervals one end of which is the quantile of probability p, one for each p but 1/2.
+/// Throws std::invalid_argument if a probability is not between 0 and 1, or they do not ascend.
+std::vector<double> levels_of_quantiles(const std::vector<double>& probabilities);
+
+/// Quantiles of each output, rows x probabilities: the lower end of the interval for p < 1/2, the upper end for
+/// p > 1/2, and the prediction for p = 1/2. They are put in ascending order in each row, so that they do not cross
+/// (Chernozhukov, Fernandez-Val & Galichon 2010). `bounds`: at the levels of levels_of_quantiles().
+std::vector<Eigen::MatrixXd> quantiles_from(const std::vector<Bounds>& bounds,
+                                            const Eigen::Ref<const Eigen::MatrixXd>& predictions,
+                                            const std::vector<double>& probabilities);
+
 }  // namespace llmt

@@ -187,24 +187,32 @@ Intervals::Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> res
     : Intervals(std::move(models), parts_of(std::move(residuals), std::move(incomplete))) {}
 
 Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads) const {
+  return predict(inputs, std::vector<double>{level}, max_threads).front();
+}
+
+std::vector<Bounds> Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                       const std::vector<double>& levels, int max_threads) const {
   if (empty()) {
     refuse("there are no held-out residuals; fit with folds and with FitOptions::intervals = true");
   }
   const Eigen::Index lacking = count_rows(parts_, &HeldOutPart::incomplete);
-  check_level("llmt::Intervals", level, count_rows(parts_, &HeldOutPart::residuals) + lacking);
+  std::vector<std::vector<Calibration>> of_complete;
+  std::vector<std::vector<Calibration>> of_incomplete;
+  for (const double level : levels) {
+    check_level("llmt::Intervals", level, count_rows(parts_, &HeldOutPart::residuals) + lacking);
+    of_complete.push_back(calibrations_of(parts_, &HeldOutPart::residuals, &HeldOutPart::incomplete, level));
+    of_incomplete.push_back(calibrations_of(parts_, &HeldOutPart::incomplete, &HeldOutPart::residuals, level));
+  }
   std::vector<Eigen::MatrixXd> predicted;
   for (const Model& model : models_) {
     predicted.push_back(model.predict(inputs, max_threads));
   }
-  const std::vector<Calibration> of_complete =
-      calibrations_of(parts_, &HeldOutPart::residuals, &HeldOutPart::incomplete, level);
-  const std::vector<Calibration> of_incomplete =
-      calibrations_of(parts_, &HeldOutPart::incomplete, &HeldOutPart::residuals, level);
   const std::vector<bool> incomplete = incomplete_rows(models_, inputs);
-  const Eigen::VectorXd usual = usual_disagreement(parts_, predicted[0].cols());
-  const Eigen::MatrixXd at = at_positions(models_[0].inputs(), inputs);
   const Eigen::Index outputs = predicted[0].cols();
-  Bounds bounds{Eigen::MatrixXd(inputs.rows(), outputs), Eigen::MatrixXd(inputs.rows(), outputs)};
+  const Eigen::VectorXd usual = usual_disagreement(parts_, outputs);
+  const Eigen::MatrixXd at = at_positions(models_[0].inputs(), inputs);
+  std::vector<Bounds> bounds(levels.size());
+  for (Bounds& each : bounds) each.lower = each.upper = Eigen::MatrixXd(inputs.rows(), outputs);
   constexpr Eigen::Index block = 256;
   parallel_for((inputs.rows() + block - 1) / block, max_threads, [&](Eigen::Index index) {
     std::vector<Estimate> estimates(parts_.size());  // of each part
@@ -216,17 +224,28 @@ Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, doubl
           estimates[p] = {prediction, spreads.empty() ? 1.0 : spread_at(spreads[o], at, row, prediction)};
         }
         draw_together(estimates, usual[o]);
-        const auto [lower, upper] = hull_at(parts_, estimates, incomplete[row] ? of_incomplete : of_complete, o);
-        bounds.lower(row, o) = lower;
-        bounds.upper(row, o) = upper;
+        for (std::size_t k = 0; k < levels.size(); ++k) {
+          const auto& calibrations = incomplete[row] ? of_incomplete[k] : of_complete[k];
+          const auto [lower, upper] = hull_at(parts_, estimates, calibrations, o);
+          bounds[k].lower(row, o) = lower;
+          bounds[k].upper(row, o) = upper;
+        }
       }
     }
   });
-  const bool has_few = values_outside(level, lacking) < 1;
-  for (Eigen::Index row = 0; has_few && row < inputs.rows(); ++row) {
-    if (incomplete[row]) bounds.uncalibrated.push_back(row);
+  for (std::size_t k = 0; k < levels.size(); ++k) {
+    const bool has_few = values_outside(levels[k], lacking) < 1;
+    for (Eigen::Index row = 0; has_few && row < inputs.rows(); ++row) {
+      if (incomplete[row]) bounds[k].uncalibrated.push_back(row);
+    }
   }
   return bounds;
+}
+
+std::vector<Eigen::MatrixXd> quantiles(const ModelWithIntervals& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                       const std::vector<double>& probabilities, int max_threads) {
+  return quantiles_from(model.intervals.predict(inputs, levels_of_quantiles(probabilities), max_threads),
+                        model.model.predict(inputs, max_threads), probabilities);
 }
 
 }  // namespace llmt

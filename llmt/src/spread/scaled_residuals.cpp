@@ -72,6 +72,43 @@ Bounds holding(Bounds bounds, const Eigen::Ref<const Eigen::MatrixXd>& predictio
   return bounds;
 }
 
+std::vector<double> levels_of_quantiles(const std::vector<double>& probabilities) {
+  std::vector<double> levels;
+  double before = 0.0;
+  for (const double p : probabilities) {
+    if (!(p > before && p < 1.0)) {
+      throw std::invalid_argument(
+          fmt::format("llmt::quantiles: the probability {} must lie between 0 and 1, and above those before it", p));
+    }
+    before = p;
+    if (p != 0.5) levels.push_back(std::abs(1.0 - 2.0 * p));
+  }
+  return levels;
+}
+
+std::vector<Eigen::MatrixXd> quantiles_from(const std::vector<Bounds>& bounds,
+                                            const Eigen::Ref<const Eigen::MatrixXd>& predictions,
+                                            const std::vector<double>& probabilities) {
+  std::vector<Eigen::MatrixXd> quantiles;
+  for (Eigen::Index o = 0; o < predictions.cols(); ++o) {
+    Eigen::MatrixXd& of_output = quantiles.emplace_back(predictions.rows(), std::ssize(probabilities));
+    std::size_t next = 0;
+    for (Eigen::Index k = 0; k < of_output.cols(); ++k) {
+      const double p = probabilities[static_cast<std::size_t>(k)];
+      if (p == 0.5) {
+        of_output.col(k) = predictions.col(o);
+      } else {
+        of_output.col(k) = (p < 0.5 ? bounds[next].lower : bounds[next].upper).col(o);
+        ++next;
+      }
+    }
+    for (Eigen::Index row = 0; row < of_output.rows(); ++row) {
+      if (!of_output.row(row).hasNaN()) std::sort(of_output.row(row).begin(), of_output.row(row).end());
+    }
+  }
+  return quantiles;
+}
+
 Eigen::Index values_outside(double level, Eigen::Index rows) {
   constexpr double slack = 1.0 + 1e-12;  // keeps 0.1 * 30 from becoming 2
   return static_cast<Eigen::Index>(std::floor((1.0 - level) * static_cast<double>(rows + 1) * slack));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "llmt/boosted.hpp"
+#include "llmt/bounds.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
 #include "oracles/samples.hpp"
@@ -227,6 +228,23 @@ TEST(Spread, TheLargestValuesAreThoseOfSorting) {
     for (std::size_t rank = 1; rank <= all.size(); ++rank) {
       EXPECT_EQ(llmt::largest_value(parts, static_cast<Eigen::Index>(rank)), all[rank - 1]);
     }
+  }
+}
+
+TEST(Quantiles, AreTheEndsOfIntervalsInOrder) {
+  const std::vector<double> probabilities = {0.1, 0.4, 0.5, 0.75};
+  const std::vector<double> levels = llmt::levels_of_quantiles(probabilities);
+  ASSERT_EQ(levels.size(), 3U);
+  EXPECT_NEAR(levels[0], 0.8, 1e-15);
+  EXPECT_NEAR(levels[1], 0.2, 1e-15);
+  EXPECT_NEAR(levels[2], 0.5, 1e-15);
+  const auto row = [](double value) { return Eigen::MatrixXd::Constant(1, 1, value); };
+  // The second interval lies beyond the prediction, 3.
+  const auto found = llmt::quantiles_from({{row(1), row(9)}, {row(4), row(5)}, {row(2), row(6)}}, row(3), probabilities);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0], (Eigen::MatrixXd(1, 4) << 1, 3, 4, 6).finished());
+  for (const std::vector<double>& bad : {std::vector<double>{0.0}, {1.0}, {0.5, 0.5}, {0.5, 0.4}, {oracle::missing}}) {
+    EXPECT_THROW(llmt::levels_of_quantiles(bad), std::invalid_argument);
   }
 }
 

@@ -186,14 +186,18 @@ bool BoostedModel::has_intervals() const {
 }
 
 Bounds BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads) const {
+  return intervals(inputs, std::vector<double>{level}, max_threads).front();
+}
+
+std::vector<Bounds> BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                            const std::vector<double>& levels, int max_threads) const {
   const Eigen::MatrixXd predicted = predict(inputs, max_threads);
-  Bounds bounds{predicted, predicted};
+  std::vector<Bounds> bounds(levels.size(), Bounds{predicted, predicted});
   for (Eigen::Index o = 0; o < num_outputs(); ++o) {
     const std::vector<SumResiduals>& parts = sums_[o].held_out;
     Eigen::Index rows = 0;
     for (const SumResiduals& part : parts) rows += std::ssize(part.residuals);
-    check_level("llmt::BoostedModel::intervals", level, rows);
-    const Eigen::Index rank = values_outside(level, rows);
+    for (const double level : levels) check_level("llmt::BoostedModel::intervals", level, rows);
     const RowBlocks blocks{inputs.rows(), rows_at_once};
     parallel_for(blocks.count(), max_threads, [&](Eigen::Index block) {
       const auto [begin, end] = blocks[block];
@@ -202,13 +206,21 @@ Bounds BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, 
         for (std::size_t p = 0; p < parts.size(); ++p) {
           scaled[p] = {parts[p].residuals, 0.0, spread_at(parts[p].spread, inputs, row, predicted(row, o))};
         }
-        const double width = largest_value(scaled, rank);
-        bounds.lower(row, o) -= width;
-        bounds.upper(row, o) += width;
+        for (std::size_t k = 0; k < levels.size(); ++k) {
+          const double width = largest_value(scaled, values_outside(levels[k], rows));
+          bounds[k].lower(row, o) -= width;
+          bounds[k].upper(row, o) += width;
+        }
       }
     });
   }
   return bounds;
+}
+
+std::vector<Eigen::MatrixXd> quantiles(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                       const std::vector<double>& probabilities, int max_threads) {
+  return quantiles_from(model.intervals(inputs, levels_of_quantiles(probabilities), max_threads),
+                        model.predict(inputs, max_threads), probabilities);
 }
 
 }  // namespace llmt
