@@ -21,13 +21,13 @@ std::vector<double> ascending(std::vector<double> residuals, std::size_t most) {
 }
 
 // The held-out rows by the parts whose spreads are learnt from one another: folds, or random parts of the only one.
-struct HeldOutRows {
+struct DealtRows {
   std::vector<int> rows;
   std::vector<int> part;
   int parts = 1;
 };
 
-HeldOutRows held_out_rows(const BoostingData& data) {
+DealtRows dealt_rows(const BoostingData& data) {
   const int folds = static_cast<int>(data.hold_outs.size());
   if (data.regime.takes_turns) return {all_rows(data.y.rows()), data.parts, folds};
   const std::vector<int>& rows = data.hold_outs.front().held_out;
@@ -38,7 +38,7 @@ HeldOutRows held_out_rows(const BoostingData& data) {
 std::vector<SumResiduals> held_out_residuals(const BoostingData& data, Eigen::Index output,
                                              const Eigen::VectorXd& residuals) {
   constexpr std::size_t most = 10000;
-  const HeldOutRows of = held_out_rows(data);
+  const DealtRows of = dealt_rows(data);
   const Eigen::MatrixXd x = data.x(of.rows, Eigen::all);
   const Eigen::VectorXd predictions = data.y.col(output)(of.rows) - residuals;
   const Eigen::VectorXd errors = residuals.cwiseAbs();

@@ -116,15 +116,18 @@ Interval hull_at(const std::vector<HeldOutPart>& parts, const std::vector<Estima
   return hull;
 }
 
-[[noreturn]] void refuse(const std::string& problem) { throw std::invalid_argument("llmt::Intervals: " + problem); }
+[[noreturn]] void refuse_intervals(const std::string& problem) {
+  throw std::invalid_argument("llmt::Intervals: " + problem);
+}
 
 // Throws std::invalid_argument if the residuals are not those of `outputs` outputs, and sorts them.
 void check_and_sort(Eigen::MatrixXd& residuals, std::size_t part, Eigen::Index outputs) {
   if (residuals.cols() != outputs) {
-    refuse(fmt::format("fold {} has {} columns of residuals for {} outputs", part, residuals.cols(), outputs));
+    refuse_intervals(
+        fmt::format("fold {} has {} columns of residuals for {} outputs", part, residuals.cols(), outputs));
   }
   if (!residuals.allFinite() || (residuals.array() < 0.0).any()) {
-    refuse(fmt::format("a residual of fold {} is negative or not finite", part));
+    refuse_intervals(fmt::format("a residual of fold {} is negative or not finite", part));
   }
   for (Eigen::Index o = 0; o < outputs; ++o) std::sort(residuals.col(o).begin(), residuals.col(o).end());
 }
@@ -133,14 +136,14 @@ void check_disagreement(const std::vector<double>& disagreement, std::size_t par
                         std::size_t models) {
   const auto is_size = [](double value) { return value >= 0.0 && std::isfinite(value); };
   if (models < 2 || std::ssize(disagreement) != outputs || !std::ranges::all_of(disagreement, is_size)) {
-    refuse(fmt::format("the disagreement of part {} is not one number of at least 0 for each of {} outputs", part,
-                       outputs));
+    refuse_intervals(fmt::format("the disagreement of part {} is not one number of at least 0 for each of {} outputs",
+                                 part, outputs));
   }
 }
 
 std::vector<HeldOutPart> parts_of(std::vector<Eigen::MatrixXd> residuals, std::vector<Eigen::MatrixXd> incomplete) {
   if (!incomplete.empty() && incomplete.size() != residuals.size()) {
-    refuse(fmt::format("{} and {} matrices of residuals", residuals.size(), incomplete.size()));
+    refuse_intervals(fmt::format("{} and {} matrices of residuals", residuals.size(), incomplete.size()));
   }
   std::vector<HeldOutPart> parts;
   for (std::size_t k = 0; k < residuals.size(); ++k) {
@@ -158,27 +161,29 @@ Intervals::Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts)
     : models_(std::move(models)), parts_(std::move(parts)) {
   for (std::size_t k = 0; k < models_.size(); ++k) {
     if (const std::string difference = difference_of_columns(models_[k], models_[0]); !difference.empty()) {
-      refuse(fmt::format("fold {} and fold 0 differ: {}", k, difference));
+      refuse_intervals(fmt::format("fold {} and fold 0 differ: {}", k, difference));
     }
   }
   std::vector<bool> has_part(models_.size(), false);
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     HeldOutPart& part = parts_[p];
     if (part.model >= models_.size() || (p > 0 && part.model < parts_[p - 1].model)) {
-      refuse(fmt::format("part {} is of model {} of {}, in the order of the models", p, part.model, models_.size()));
+      refuse_intervals(
+          fmt::format("part {} is of model {} of {}, in the order of the models", p, part.model, models_.size()));
     }
     has_part[part.model] = true;
     const Model& model = models_[part.model];
     check_and_sort(part.residuals, p, model.num_outputs());
     check_and_sort(part.incomplete, p, model.num_outputs());
     if (!part.spreads.empty() && std::ssize(part.spreads) != model.num_outputs()) {
-      refuse(fmt::format("part {} has {} spreads for {} outputs", p, part.spreads.size(), model.num_outputs()));
+      refuse_intervals(
+          fmt::format("part {} has {} spreads for {} outputs", p, part.spreads.size(), model.num_outputs()));
     }
     if (!part.disagreement.empty()) check_disagreement(part.disagreement, p, model.num_outputs(), models_.size());
     for (const Spread& spread : part.spreads) check_spread(spread, model.inputs());
   }
   if (std::ranges::count(has_part, false) > 0) {
-    refuse(fmt::format("{} models and {} matrices of residuals", models_.size(), parts_.size()));
+    refuse_intervals(fmt::format("{} models and {} matrices of residuals", models_.size(), parts_.size()));
   }
 }
 
@@ -193,7 +198,7 @@ Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, doubl
 std::vector<Bounds> Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                                        const std::vector<double>& levels, int max_threads) const {
   if (empty()) {
-    refuse("there are no held-out residuals; fit with folds and with FitOptions::intervals = true");
+    refuse_intervals("there are no held-out residuals; fit with folds and with FitOptions::intervals = true");
   }
   const Eigen::Index lacking = count_rows(parts_, &HeldOutPart::incomplete);
   std::vector<std::vector<Calibration>> of_complete;

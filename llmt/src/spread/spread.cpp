@@ -9,7 +9,7 @@
 namespace llmt {
 namespace {
 
-constexpr double largest_factor = 1e6;
+constexpr double largest_spread = 1e6;
 
 [[noreturn]] void refuse(const std::string& problem) { throw std::invalid_argument("llmt::Spread: " + problem); }
 
@@ -62,8 +62,8 @@ void check_spread(const Spread& spread, const std::vector<InputColumn>& inputs) 
   for (int i = 0; i < count; ++i) {
     const SpreadNode& node = spread.nodes[i];
     if (node.is_leaf()) {
-      if (!(node.factor > 0.0 && node.factor <= largest_factor)) {
-        refuse(fmt::format("the factor {} of node {} must be positive and at most {}", node.factor, i, largest_factor));
+      if (!(node.factor > 0.0 && node.factor <= largest_spread)) {
+        refuse(fmt::format("the factor {} of node {} must be positive and at most {}", node.factor, i, largest_spread));
       }
       continue;
     }
