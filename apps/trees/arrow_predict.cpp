@@ -68,6 +68,7 @@ void predict_files(const PredictArguments& arguments) {
   };
   refuse(arguments.json, "--json");
   refuse(arguments.interval > 0.0, "--interval");
+  refuse(!arguments.quantiles.empty(), "--quantiles");
   const Model model = load_model(arguments.model, false).model;
   std::vector<std::string> files = {arguments.data};
   files.insert(files.end(), arguments.more.begin(), arguments.more.end());

@@ -94,7 +94,7 @@ struct BoostResult {
 /// the whole procedure, shares and number of trees chosen without the row. With more rows it is the mean of the sum and
 /// such a tree where the tree alone is better than the sum on the held-out rows.
 ///
-/// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
+/// BoostedModel::intervals() gives intervals, from the held-out rows' residuals and their spread.
 ///
 /// Inputs may be missing (NaN). A category is taken as the indicators of its most frequent levels,
 /// `most_boosted_levels` of them. Weights are as for fit(); a row of

@@ -7,19 +7,56 @@
 #include "boosted/race.hpp"
 #include "llmt/boosted.hpp"
 #include "llmt/statistics.hpp"
+#include "spread/fit_spread.hpp"
 
 namespace llmt {
 namespace {
 
-// Sorted; of many, evenly spaced ones, which say as much of intervals.
-std::vector<double> ascending(std::vector<double> residuals) {
-  constexpr std::size_t most = 10000;
+// Sorted; of more than `most`, evenly spaced ones, which say as much of intervals.
+std::vector<double> ascending(std::vector<double> residuals, std::size_t most) {
   std::ranges::sort(residuals);
   const std::size_t count = residuals.size();
   if (count <= most) return residuals;
   std::vector<double> kept;
   for (std::size_t k = 0; k < most; ++k) kept.push_back(residuals[(2 * k + 1) * count / (2 * most)]);
   return kept;
+}
+
+// The held-out rows by the parts whose spreads are learnt from one another: folds, or random parts of the only one.
+struct DealtRows {
+  std::vector<int> rows;
+  std::vector<int> part;
+  int parts = 1;
+};
+
+DealtRows dealt_rows(const BoostingData& data) {
+  const int folds = static_cast<int>(data.hold_outs.size());
+  if (data.regime.takes_turns) return {all_rows(data.y.rows()), data.parts, folds};
+  const std::vector<int>& rows = data.hold_outs.front().held_out;
+  return {rows, dealt_parts(std::ssize(rows), parts_of_one_fold), parts_of_one_fold};
+}
+
+// `residuals`: of the held-out rows.
+std::vector<SumResiduals> held_out_residuals(const BoostingData& data, Eigen::Index output,
+                                             const Eigen::VectorXd& residuals) {
+  constexpr std::size_t most = 10000;
+  const DealtRows of = dealt_rows(data);
+  const Eigen::MatrixXd x = data.x(of.rows, Eigen::all);
+  const Eigen::VectorXd predictions = data.y.col(output)(of.rows) - residuals;
+  const Eigen::VectorXd errors = residuals.cwiseAbs();
+  const std::vector<Spread> spreads = fit_spreads({x, data.inputs, predictions, errors}, of.part, of.parts);
+  if (std::ranges::all_of(spreads, [](const Spread& spread) { return spread.nodes.empty(); })) {
+    return {{ascending({errors.begin(), errors.end()}, most)}};
+  }
+  std::vector<SumResiduals> parts;
+  for (int p = 0; p < of.parts; ++p) {
+    std::vector<double> scaled;
+    for (Eigen::Index i = 0; i < errors.size(); ++i) {
+      if (of.part[i] == p) scaled.push_back(errors(i) / spread_at(spreads[p], x, i, predictions(i)));
+    }
+    parts.push_back({ascending(std::move(scaled), most / static_cast<std::size_t>(of.parts)), spreads[p]});
+  }
+  return parts;
 }
 
 // An output divided by its deviation about its mean.
@@ -156,9 +193,18 @@ BoostedSum fit_output(const BoostingData& data, Eigen::Index output, const Boost
   }
   BoostedSum sum = sum_of(result.parts, plan.rows, mean, scale);
   summary.trees = std::ssize(sum.trees);
-  const Eigen::VectorXd absolute = scale * result.residuals.cwiseAbs();
-  sum.residuals = ascending({absolute.begin(), absolute.end()});
+  sum.held_out = held_out_residuals(data, output, scale * result.residuals);
   return sum;
+}
+
+// A spread of inputs that stand elsewhere: input j in the column columns[j].
+Spread with_columns(const Spread& spread, const std::vector<int>& columns) {
+  Spread moved = spread;
+  for (SpreadNode& node : moved.nodes) {
+    if (node.column < std::ssize(columns)) node.column = columns[node.column];
+  }
+  for (std::size_t j = 0; j < spread.levels.size(); ++j) moved.levels[columns[j]] = spread.levels[j];
+  return moved;
 }
 
 // The model with its inputs where the caller has them.
@@ -174,6 +220,7 @@ BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
       feature.first = data.columns[feature.first];
       if (feature.second >= 0) feature.second = data.columns[feature.second];
     }
+    for (SumResiduals& part : sum.held_out) part.spread = with_columns(part.spread, data.columns);
   }
   return {std::move(inputs), data.outputs, std::move(deviations), std::move(sums)};
 }
