@@ -29,9 +29,8 @@ struct DealtRows {
   int parts = 1;
 };
 
-DealtRows dealt_rows(const BoostingData& data) {
-  const int folds = static_cast<int>(data.hold_outs.size());
-  if (data.regime.takes_turns) return {all_rows(data.y.rows()), data.parts, folds};
+DealtRows dealt_rows(const BoostingData& data, Eigen::Index held_out) {
+  if (held_out == data.y.rows()) return {all_rows(held_out), data.parts, std::ranges::max(data.parts) + 1};
   const std::vector<int>& rows = data.hold_outs.front().held_out;
   return {rows, dealt_parts(std::ssize(rows), parts_of_one_fold), parts_of_one_fold};
 }
@@ -40,7 +39,7 @@ DealtRows dealt_rows(const BoostingData& data) {
 std::vector<SumResiduals> held_out_residuals(const BoostingData& data, Eigen::Index output,
                                              const Eigen::VectorXd& residuals) {
   constexpr std::size_t most = 10000;
-  const DealtRows of = dealt_rows(data);
+  const DealtRows of = dealt_rows(data, residuals.size());
   const Eigen::MatrixXd x = data.x(of.rows, Eigen::all);
   const Eigen::VectorXd predictions = data.y.col(output)(of.rows) - residuals;
   const Eigen::VectorXd errors = residuals.cwiseAbs();

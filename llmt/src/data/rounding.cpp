@@ -22,26 +22,27 @@ constexpr double fewest_equal = 0.1;
 
 using Entry = std::pair<double, Eigen::Index>;  // value and row
 
-double rounding_of(const std::vector<Entry>& sorted) {
-  const auto last = static_cast<double>(sorted.size() - 1);
-  const auto half = [&](double part) { return 0.5 * sorted[static_cast<std::size_t>(part * last)].first; };
+// `different`: values, ascending.
+double rounding_of(const std::vector<double>& different) {
+  const auto last = static_cast<double>(different.size() - 1);
+  const auto half = [&](double part) { return 0.5 * different[static_cast<std::size_t>(part * last)]; };
   // Halves, because the difference of two numbers may be none.
   double half_spread = half(0.9) - half(0.1);
   if (half_spread == 0.0) half_spread = half(1.0) - half(0.0);
-  return half_spread * (2.0 * std::min(part_of_spread, part_of_distance / static_cast<double>(sorted.size())));
+  return half_spread * (2.0 * std::min(part_of_spread, part_of_distance / static_cast<double>(different.size())));
 }
 
 // Of each sorted value what it becomes; empty: it stays as it is.
 std::vector<double> settled(const std::vector<Entry>& sorted) {
-  const double distance = rounding_of(sorted);
-  if (!std::isfinite(distance)) return {};  // a column that has not been checked yet
-  Eigen::Index different = 1, left = 1;
-  for (std::size_t i = 1; i < sorted.size(); ++i) {
-    const double step = sorted[i].first - sorted[i - 1].first;
-    different += step > 0.0 ? 1 : 0;
-    left += step > distance ? 1 : 0;
+  std::vector<double> different;
+  for (const Entry& each : sorted) {
+    if (different.empty() || each.first > different.back()) different.push_back(each.first);
   }
-  if (static_cast<double>(different - left) <= fewest_equal * static_cast<double>(different)) return {};
+  const double distance = rounding_of(different);
+  if (!std::isfinite(distance)) return {};  // a column that has not been checked yet
+  std::size_t vanish = 0;
+  for (std::size_t i = 1; i < different.size(); ++i) vanish += different[i] - different[i - 1] <= distance ? 1 : 0;
+  if (static_cast<double>(vanish) <= fewest_equal * static_cast<double>(different.size())) return {};
   std::vector<double> values;
   std::size_t begin = 0;
   for (std::size_t i = 0; i < sorted.size(); ++i) {

@@ -12,14 +12,14 @@
 
 namespace {
 
-struct Rows {
+struct LoggedRows {
   Eigen::MatrixXd x;
   Eigen::VectorXd y;
 };
 
 // A log of a system with its own past as inputs: the drive changes its level now and then, so that blocks of rows lie
 // outside of the range of the others, and the system is steeper at one side.
-Rows log_with_lags(std::uint64_t seed) {
+LoggedRows log_with_lags(std::uint64_t seed) {
   llmt::Random random(seed);
   constexpr Eigen::Index count = 320;
   Eigen::VectorXd u(count), y(count);
@@ -29,13 +29,13 @@ Rows log_with_lags(std::uint64_t seed) {
     const double drive = 0.3 * u(t) + 0.1 * std::abs(u(t));
     y(t) = 0.8 * y(t - 1) + drive - 0.05 * y(t - 1) * y(t - 1) + 0.02 * random.normal();
   }
-  Rows rows{Eigen::MatrixXd(count - 2, 4), y.tail(count - 2)};
+  LoggedRows rows{Eigen::MatrixXd(count - 2, 4), y.tail(count - 2)};
   rows.x << y.segment(1, count - 2), y.head(count - 2), u.tail(count - 2), u.segment(1, count - 2);
   return rows;
 }
 
 // Root mean square error of least squares over the folds.
-double least_squares_rmse(const Rows& rows, const llmt::FoldOptions& options) {
+double least_squares_rmse(const LoggedRows& rows, const llmt::FoldOptions& options) {
   double squares = 0.0;
   for (const llmt::Fold& fold : llmt::make_folds(rows.y.size(), options)) {
     const auto with_constant = [&](const std::vector<Eigen::Index>& at) {
@@ -53,7 +53,7 @@ class CandidateErrors : public testing::TestWithParam<llmt::FoldKind> {};
 
 TEST_P(CandidateErrors, DoNotDependOnTheOthers) {
   for (const std::uint64_t seed : {1, 2, 3}) {
-    const Rows rows = log_with_lags(seed);
+    const LoggedRows rows = log_with_lags(seed);
     llmt::FitOptions options{.validity = llmt::ValidityChoice::automatic};
     options.folds.kind = GetParam();
     const double expected = least_squares_rmse(rows, options.folds);
