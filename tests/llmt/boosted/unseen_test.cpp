@@ -14,7 +14,7 @@
 
 namespace {
 
-constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
+constexpr double empty_cell = std::numeric_limits<double>::quiet_NaN();
 constexpr double unknown = -1.0;
 
 // The levels have 55, 30, 12 and 3 % of the rows: the mean of their offsets is 0.55.
@@ -45,7 +45,7 @@ TEST(Unseen, CategoryHasTheMeanOfTheLevels) {
     const llmt::TrainingData data = of_levels(rows);
     const llmt::BoostedModel model = llmt::fit_boosted(data).model;
     Eigen::MatrixXd asked(4, 2);
-    asked << unknown, 0.5, no_value, 0.5, 7.0, -0.5, 0.0, 0.5;
+    asked << unknown, 0.5, empty_cell, 0.5, 7.0, -0.5, 0.0, 0.5;
     const Eigen::VectorXd y = model.predict(asked).col(0);
     EXPECT_NEAR(y(0), 0.55 + 1.0, 0.3) << rows;
     EXPECT_EQ(y(1), y(0)) << rows;
@@ -68,9 +68,9 @@ TEST(Unseen, EmptyNumberHasTheMeanOverIt) {
     const llmt::BoostedModel model = llmt::fit_boosted(data).model;
     for (const double at : {-0.7, 0.0, 0.7}) {
       const double mean = data.outputs.mean() + 3.0 * (at - x.col(1).mean());
-      EXPECT_NEAR(model.predict(Eigen::RowVector2d(no_value, at))(0), mean, 0.15) << rows << " rows, x_1 = " << at;
+      EXPECT_NEAR(model.predict(Eigen::RowVector2d(empty_cell, at))(0), mean, 0.15) << rows << " rows, x_1 = " << at;
     }
-    EXPECT_NEAR(model.predict(Eigen::RowVector2d(no_value, no_value))(0), data.outputs.mean(), 0.15) << rows;
+    EXPECT_NEAR(model.predict(Eigen::RowVector2d(empty_cell, empty_cell))(0), data.outputs.mean(), 0.15) << rows;
   }
 }
 
@@ -81,7 +81,7 @@ TEST(Unseen, HeldOutRowsArePredictedAsNewOnes) {
   data.categorical_inputs = {};
   for (Eigen::Index row = 0; row < 1000; row += 10) {
     data.held_out.push_back(row);
-    data.inputs(row, 0) = no_value;
+    data.inputs(row, 0) = empty_cell;
   }
   const llmt::BoostResult result = llmt::fit_boosted(data);
   const Eigen::VectorXd predicted = result.model.predict(data.inputs(data.held_out, Eigen::all)).col(0);
@@ -92,7 +92,7 @@ TEST(Unseen, HeldOutRowsArePredictedAsNewOnes) {
 TEST(Unseen, TableOfLeavesAndOneRowAgree) {
   const llmt::BoostedModel model = llmt::fit_boosted(of_levels(1000)).model;
   Eigen::MatrixXd many = of_levels(400).inputs;
-  for (Eigen::Index row = 0; row < 400; row += 7) many(row, row % 2) = no_value;
+  for (Eigen::Index row = 0; row < 400; row += 7) many(row, row % 2) = empty_cell;
   const Eigen::VectorXd together = model.predict(many).col(0);
   for (Eigen::Index row = 0; row < 400; ++row) EXPECT_EQ(model.predict(many.row(row))(0), together(row)) << row;
 }
