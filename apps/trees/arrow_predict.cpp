@@ -68,6 +68,7 @@ void predict_files(const PredictArguments& arguments) {
   };
   refuse(arguments.json, "--json");
   refuse(arguments.interval > 0.0, "--interval");
+  refuse(!arguments.quantiles.empty(), "--quantiles");
   const Model model = load_model(arguments.model, false).model;
   std::vector<std::string> files = {arguments.data};
   files.insert(files.end(), arguments.more.begin(), arguments.more.end());
@@ -84,7 +85,7 @@ void predict_files(const PredictArguments& arguments) {
     std::string text;
     for (const OutputColumn& output : model.outputs()) text += csv_field(output.name + "_pred", separator) + separator;
     sink(text + fmt::format("outside{0}outside_by{0}leverage\n", separator));
-    const Eigen::Index most = rows_at_once(model.inputs().size());
+    const Eigen::Index most = arrow_rows_at_once(model.inputs().size());
     for (Eigen::Index first = 0; first < table.rows(); first += most) {
       const Eigen::Index count = std::min(most, table.rows() - first);
       const Eigen::MatrixXd inputs = reader.read(first, count);

@@ -15,7 +15,8 @@ struct PredictArguments {
   std::vector<std::string> more;  ///< files behind `data`
   std::string output;
   bool json = false;
-  double interval = 0.0;  ///< level; 0: none
+  double interval = 0.0;          ///< level; 0: none
+  std::vector<double> quantiles;  ///< probabilities
   DecimalMark mark = DecimalMark::point;
   bool thousands = false;
   int threads = 0;

@@ -54,14 +54,44 @@ void add_errors(const PredictArguments& arguments, const Csv& csv, report::Predi
   }
 }
 
-// The file's fault, not the caller's: no residuals, or too few for the level.
-Bounds bounds_of(const PredictArguments& arguments, const BoostedModel& model, const Eigen::MatrixXd& values) {
+bool asks_for_intervals(const PredictArguments& arguments) {
+  return arguments.interval > 0.0 || !arguments.quantiles.empty();
+}
+
+// The intervals and quantiles that are asked for.
+void add_intervals(const PredictArguments& arguments, const BoostedModel& model, const Eigen::MatrixXd& inputs,
+                   report::Prediction& predicted) {
   if (!model.has_intervals()) {
     throw std::runtime_error(fmt::format("{}: the file has no held-out residuals; fit again", arguments.model));
   }
+  if (arguments.interval > 0.0) predicted.bounds = model.intervals(inputs, arguments.interval, arguments.threads);
+  if (!arguments.quantiles.empty()) {
+    predicted.quantiles = quantiles(model, inputs, arguments.quantiles, arguments.threads);
+  }
+}
+
+void add_intervals(const PredictArguments& arguments, const ModelWithIntervals& file, const Eigen::MatrixXd& inputs,
+                   report::Prediction& predicted) {
+  if (file.intervals.empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: the file has no held-out residuals; fit without --no-intervals and with folds", arguments.model));
+  }
+  if (arguments.interval > 0.0) {
+    predicted.bounds = holding(file.intervals.predict(inputs, arguments.interval, arguments.threads), predicted.values);
+  }
+  if (!arguments.quantiles.empty()) {
+    predicted.quantiles = quantiles(file, inputs, arguments.quantiles, arguments.threads);
+  }
+}
+
+// What cannot be had is the file's fault, not the caller's: it has too few residuals for the level.
+template <class AnyModel>
+void add_asked_intervals(const PredictArguments& arguments, const AnyModel& model, const Eigen::MatrixXd& inputs,
+                         report::Prediction& predicted) {
+  if (!asks_for_intervals(arguments)) return;
+  predicted.probabilities = arguments.quantiles;
   try {
-    const Eigen::RowVectorXd widths = model.half_widths(arguments.interval).transpose();
-    return {values.rowwise() - widths, values.rowwise() + widths};
+    add_intervals(arguments, model, inputs, predicted);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
   }
@@ -72,10 +102,8 @@ report::Prediction predict_table(const PredictArguments& arguments, const Booste
   report::Prediction predicted = predict_values(arguments, model, inputs);
   predicted.has_leverage = false;
   for (const double distance : distance_outside(model, inputs.values)) predicted.extrapolation.push_back({distance});
-  if (arguments.interval > 0.0) {
-    predicted.bounds = bounds_of(arguments, model, predicted.values);
-    predicted.bounds->uncalibrated = incomplete_rows(model, inputs.values);
-  }
+  add_asked_intervals(arguments, model, inputs.values, predicted);
+  if (predicted.bounds) predicted.bounds->uncalibrated = incomplete_rows(model, inputs.values);
   add_errors(arguments, csv, predicted);
   return predicted;
 }
@@ -85,17 +113,7 @@ report::Prediction predict_table(const PredictArguments& arguments, const ModelW
   const report::ModelInputs inputs = report::read_inputs(csv, model, arguments.threads);
   report::Prediction predicted = predict_values(arguments, model, inputs);
   predicted.extrapolation = model.extrapolation(inputs.values, arguments.threads);
-  if (arguments.interval > 0.0) {
-    if (file.intervals.empty()) {
-      throw std::runtime_error(fmt::format(
-          "{}: the file has no held-out residuals; fit without --no-intervals and with folds", arguments.model));
-    }
-    try {
-      predicted.bounds = file.intervals.predict(inputs.values, arguments.interval, arguments.threads);
-    } catch (const std::invalid_argument& error) {  // too few rows for the level: the model's fault, not the caller's
-      throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
-    }
-  }
+  add_asked_intervals(arguments, file, inputs.values, predicted);
   add_errors(arguments, csv, predicted);
   return predicted;
 }
@@ -108,6 +126,7 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
     if (predicted.bounds) {
       added.insert(added.end(), {target + "_low", target + "_high"});
     }
+    for (const double p : predicted.probabilities) added.push_back(fmt::format("{}_q{}", target, p));
   }
   added.insert(added.end(), {"outside", "outside_by"});
   if (predicted.has_leverage) added.emplace_back("leverage");
@@ -130,6 +149,10 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
         append_number(text, csv.decimal_mark(), predicted.bounds->lower(row, o));
         text += csv.separator();
         append_number(text, csv.decimal_mark(), predicted.bounds->upper(row, o));
+      }
+      for (Eigen::Index k = 0; k < std::ssize(predicted.probabilities); ++k) {
+        text += csv.separator();
+        append_number(text, csv.decimal_mark(), predicted.quantiles[static_cast<std::size_t>(o)](row, k));
       }
     }
     const Extrapolation& extrapolation = predicted.extrapolation[row];
@@ -162,12 +185,13 @@ report::Prediction predict_file(const PredictArguments& arguments, std::optional
   }
   const ModelWithIntervals file =
       read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
-                            [&](const std::string& path) { return load_model(path, arguments.interval > 0.0); });
+                            [&](const std::string& path) { return load_model(path, asks_for_intervals(arguments)); });
   read();
   return predict_table(arguments, file, *csv);
 }
 
 void predict_command(const PredictArguments& arguments) {
+  levels_of_quantiles(arguments.quantiles);  // throws if they do not ascend
   if (is_arrow_file(arguments.data) || !arguments.more.empty()) {
     predict_files(arguments);
     return;
@@ -213,6 +237,10 @@ void add_predict(CLI::App& app) {
   constexpr NumberRange level = {0.01, 0.9999, "a number from 0.01 to 0.9999"};
   add_number(*command, "--interval", arguments->interval, level,
              "Level of prediction intervals, such as 0.9: adds TARGET_low and TARGET_high");
+  constexpr NumberRange probability = {0.0001, 0.9999, "numbers from 0.0001 to 0.9999, ascending"};
+  add_numbers(*command, "--quantiles", arguments->quantiles, probability,
+              "Probabilities such as 0.05,0.5,0.95: adds TARGET_q0.05 and so on, values below which that share of new "
+              "rows lies");
   add_decimal_comma(*command, arguments->mark);
   add_thousands(*command, arguments->thousands);
   add_threads(*command, arguments->threads);

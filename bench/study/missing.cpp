@@ -42,15 +42,14 @@ void empty_cells(Eigen::MatrixXd& inputs, double share, llmt::Random& random) {
 
 // As if all held-out rows were of one kind.
 llmt::Intervals pooled(const llmt::Intervals& intervals) {
-  std::vector<Eigen::MatrixXd> residuals;
-  for (std::size_t f = 0; f < intervals.models().size(); ++f) {
-    const Eigen::MatrixXd& complete = intervals.residuals()[f];
-    const Eigen::MatrixXd& incomplete = intervals.incomplete_residuals()[f];
-    Eigen::MatrixXd all(complete.rows() + incomplete.rows(), complete.cols());
-    all << complete, incomplete;
-    residuals.push_back(std::move(all));
+  std::vector<llmt::HeldOutPart> parts = intervals.parts();
+  for (llmt::HeldOutPart& part : parts) {
+    Eigen::MatrixXd all(part.residuals.rows() + part.incomplete.rows(), part.residuals.cols());
+    all << part.residuals, part.incomplete;
+    part.residuals = std::move(all);
+    part.incomplete.resize(0, part.residuals.cols());
   }
-  return {intervals.models(), std::move(residuals)};
+  return {intervals.models(), std::move(parts)};
 }
 
 void count(const llmt::Intervals& intervals, const Trial& trial, Coverage& sum) {

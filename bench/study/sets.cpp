@@ -59,7 +59,8 @@ Result run(const Task& task, const llmt::FitOptions& options) {
     sum.seconds += measure([&] { fit = llmt::fit(trial.train_inputs, trial.train_output, options); }).wall;
     const double tree = test_rmse(fit->model, trial);
     const double linear = test_rmse(llmt::fit(trial.train_inputs, trial.train_output, least_squares()).model, trial);
-    const llmt::Intervals first_fold({fit->intervals.models()[0]}, {fit->intervals.residuals()[0]});
+    const llmt::Intervals first_fold({fit->intervals.models()[0]},
+                                     std::vector<llmt::HeldOutPart>{fit->intervals.parts()[0]});
     add(sum.cv_plus, 1.0 / task.trials, held(fit->intervals, trial));
     add(sum.split_conformal, 1.0 / task.trials, held(first_fold, trial));
     sum.tree += tree;

@@ -84,7 +84,7 @@ TEST(BoostProgram, RefusesByNameWhatIsForOneTree) {
   refused("fit one.csv -t y --boost",
           "one.csv: 1 row; --boost needs at least 10 that differ, llmt fit without --boost takes fewer");
   refused("inspect m.json --rules", "m.json: --rules is not for a sum of trees");
-  refused("predict m.json d.csv --interval 0.999", "held-out residuals of \"y\" are too few for the level 0.999");
+  refused("predict m.json d.csv --interval 0.999", "m.json: level 0.999 needs at least 999 held-out rows, there are ");
 }
 
 TEST(BoostProgram, PredictsIntervals) {
@@ -93,9 +93,12 @@ TEST(BoostProgram, PredictsIntervals) {
   const Outcome predicted = folder.run(LLMT_PROGRAM " predict m.json d.csv --interval 0.9");
   ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
   const llmt::Csv answer = llmt::Csv::parse(predicted.out, "answer");
-  const double width = llmt::load_boosted(folder.file("m.json")).half_widths(0.9)(0);
-  EXPECT_EQ(answer.numbers("y_low"), (answer.numbers("y_pred").array() - width).matrix());
-  EXPECT_EQ(answer.numbers("y_high"), (answer.numbers("y_pred").array() + width).matrix());
+  const llmt::BoostedModel model = llmt::load_boosted(folder.file("m.json"));
+  Eigen::MatrixXd inputs(answer.rows(), model.num_inputs());
+  for (Eigen::Index j = 0; j < inputs.cols(); ++j) inputs.col(j) = answer.numbers(model.inputs()[j].name);
+  const llmt::Bounds bounds = model.intervals(inputs, 0.9);
+  EXPECT_EQ(answer.numbers("y_low"), bounds.lower.col(0));
+  EXPECT_EQ(answer.numbers("y_high"), bounds.upper.col(0));
 }
 
 TEST(BoostProgram, InspectsASum) {

@@ -54,6 +54,39 @@ TEST(LlmtProgram, IntervalsHoldTheirLevelOnFreshRows) {
   EXPECT_NE(narrow.err.find("level 0.999 needs at least 999 held-out rows, there are 200"), std::string::npos);
 }
 
+// Of a tree and of a sum: the ends of 90 % are the quantiles of 5 and 95 %, and no quantile is below another.
+TEST(LlmtProgram, QuantilesDoNotCross) {
+  const Folder folder;
+  folder.write("d.csv", kinked(300, 1));
+  folder.write("fresh.csv", kinked(1000, 2));
+  for (const char* kind : {"", " --boost"}) {
+    ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o m.json" + kind).exit_code, 0);
+    const Outcome predicted = folder.run(
+        llmt_program + " predict m.json fresh.csv --interval 0.9 --quantiles 0.05,0.25,0.45,0.5,0.55,0.75,0.95 -o p.csv");
+    ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
+    const llmt::Csv result = llmt::Csv::read(folder.file("p.csv"));
+    EXPECT_EQ(result.numbers("y_q0.05"), result.numbers("y_low"));
+    EXPECT_EQ(result.numbers("y_q0.95"), result.numbers("y_high"));
+    const Eigen::ArrayXd y = result.numbers("y");
+    Eigen::ArrayXd before = Eigen::ArrayXd::Constant(1000, -1e9);
+    for (const double p : {0.05, 0.25, 0.45, 0.5, 0.55, 0.75, 0.95}) {
+      const Eigen::ArrayXd values = result.numbers(fmt::format("y_q{}", p));
+      EXPECT_TRUE((values >= before).all()) << kind << p;
+      EXPECT_NEAR(static_cast<double>((y <= values).count()) / 1000.0, p, 0.08) << kind;
+      before = values;
+    }
+  }
+  const Outcome falling = folder.run(llmt_program + " predict m.json fresh.csv --quantiles 0.5,0.1");
+  EXPECT_EQ(falling.exit_code, 2);
+  EXPECT_NE(falling.err.find("the probability 0.1 must lie between 0 and 1, and above those before it"),
+            std::string::npos)
+      << falling.err;
+  const json values =
+      json::parse(folder.run(llmt_program + " predict m.json fresh.csv --quantiles 0.1,0.5 --json").out);
+  EXPECT_EQ(values["targets"][0]["quantiles"][0]["probability"], 0.1);
+  EXPECT_EQ(values["targets"][0]["quantiles"][1]["values"], values["targets"][0]["predicted"]);
+}
+
 TEST(LlmtProgram, NoIntervalsWithoutHeldOutResiduals) {
   const Folder folder;
   folder.write("d.csv", kinked(100, 1));

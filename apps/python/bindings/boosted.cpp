@@ -51,18 +51,23 @@ auto predict_by_sum(const BoostedModel& self, const Array& inputs, int threads) 
 
 // Lower and upper ends; no row is apart, as those of trees that lack an input are.
 auto intervals_of_sum(const BoostedModel& self, const Array& inputs, double level, int threads) {
-  const Eigen::RowVectorXd widths = self.half_widths(level).transpose();
-  const auto moved = [&](double sign) {
-    return stacked<double>(inputs, self.num_outputs(), [&](const Eigen::MatrixXd& block) -> Eigen::MatrixXd {
-      return self.predict(block, threads).rowwise() + sign * widths;
-    });
-  };
-  auto lower = moved(-1.0);
-  std::vector<Eigen::Index> incomplete;
+  const Eigen::Index rows = static_cast<Eigen::Index>(inputs.shape(0));
+  Bounds bounds{Eigen::MatrixXd(rows, self.num_outputs()), Eigen::MatrixXd(rows, self.num_outputs())};
   for_blocks(inputs, predicted_rows, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
-    for (const Eigen::Index row : incomplete_rows(self, block)) incomplete.push_back(first + row);
+    const Bounds part = self.intervals(block, level, threads);
+    bounds.lower.middleRows(first, block.rows()) = part.lower;
+    bounds.upper.middleRows(first, block.rows()) = part.upper;
+    for (const Eigen::Index row : incomplete_rows(self, block)) bounds.uncalibrated.push_back(first + row);
   });
-  return std::make_tuple(std::move(lower), moved(1.0), std::move(incomplete));
+  return std::make_tuple(array_of<double>(std::move(bounds.lower)), array_of<double>(std::move(bounds.upper)),
+                         std::move(bounds.uncalibrated));
+}
+
+auto quantiles_of_sum(const BoostedModel& self, const Array& inputs, const std::vector<double>& probabilities,
+                      int threads) {
+  return stacked_quantiles(inputs, self.num_outputs(), probabilities, [&](const Eigen::MatrixXd& block) {
+    return quantiles(self, block, probabilities, threads);
+  });
 }
 
 // How far rows lie outside of the training ranges; one column, where trees have a second one.
@@ -137,6 +142,7 @@ void add_boosted(nb::module_& module) {
           [](const Self& self, const Array& inputs, int) { return extrapolation_of_sum(self, inputs); },
           nb::arg("inputs"), nb::arg("threads") = 0)
       .def("intervals", &intervals_of_sum, nb::arg("inputs"), nb::arg("level"), nb::arg("threads") = 0)
+      .def("quantiles", &quantiles_of_sum, nb::arg("inputs"), nb::arg("probabilities"), nb::arg("threads") = 0)
       .def("attribute", &attribute_to_sum, nb::arg("inputs"), nb::arg("background"), nb::arg("threads") = 0)
       .def("importance", &importance_in_sum, nb::arg("inputs"), nb::arg("threads") = 0)
       .def("partial_dependence", &partial_dependence_of, nb::arg("inputs"), nb::arg("input"), nb::arg("values"),

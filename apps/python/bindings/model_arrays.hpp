@@ -59,6 +59,18 @@ inline auto arrays_of(std::vector<Eigen::MatrixXd> matrices) {
   return arrays;
 }
 
+/// Quantiles of all rows, one matrix (rows x probabilities) for each output. `of`: those of a block.
+inline auto stacked_quantiles(const Array& inputs, Eigen::Index outputs, const std::vector<double>& probabilities,
+                              const std::function<std::vector<Eigen::MatrixXd>(const Eigen::MatrixXd& block)>& of) {
+  const auto rows = static_cast<Eigen::Index>(inputs.shape(0));
+  std::vector<Eigen::MatrixXd> all(static_cast<std::size_t>(outputs), Eigen::MatrixXd(rows, std::ssize(probabilities)));
+  for_blocks(inputs, predicted_rows, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
+    const std::vector<Eigen::MatrixXd> part = of(block);
+    for (std::size_t o = 0; o < all.size(); ++o) all[o].middleRows(first, block.rows()) = part[o];
+  });
+  return arrays_of(std::move(all));
+}
+
 /// What is known of the inputs.
 inline nb::typed<nb::list, nb::typed<nb::dict, nb::str, nb::any>> columns_of(const std::vector<InputColumn>& inputs) {
   nb::typed<nb::list, nb::typed<nb::dict, nb::str, nb::any>> columns;

@@ -65,13 +65,20 @@ auto intervals(const ModelWithIntervals& self, const Array& inputs, double level
   const Eigen::Index rows = static_cast<Eigen::Index>(inputs.shape(0));
   Bounds bounds{Eigen::MatrixXd(rows, self.model.num_outputs()), Eigen::MatrixXd(rows, self.model.num_outputs())};
   for_blocks(inputs, judged_rows, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
-    const Bounds part = self.intervals.predict(block, level, threads);
+    const Bounds part = holding(self.intervals.predict(block, level, threads), self.model.predict(block, threads));
     bounds.lower.middleRows(first, block.rows()) = part.lower;
     bounds.upper.middleRows(first, block.rows()) = part.upper;
     for (const Eigen::Index row : part.uncalibrated) bounds.uncalibrated.push_back(first + row);
   });
   return std::make_tuple(array_of<double>(std::move(bounds.lower)), array_of<double>(std::move(bounds.upper)),
                          bounds.uncalibrated);
+}
+
+auto quantiles_of(const ModelWithIntervals& self, const Array& inputs, const std::vector<double>& probabilities,
+                  int threads) {
+  return stacked_quantiles(inputs, self.model.num_outputs(), probabilities, [&](const Eigen::MatrixXd& block) {
+    return quantiles(self, block, probabilities, threads);
+  });
 }
 
 // Contributions of all rows, one matrix (rows x inputs) for each output, and the prediction at the reference.
@@ -125,6 +132,7 @@ void add_models(nb::module_& module) {
       .def("validities", &validities, nb::arg("inputs"), nb::arg("partition"), nb::arg("threads") = 0)
       .def("extrapolation", &extrapolation, nb::arg("inputs"), nb::arg("threads") = 0)
       .def("intervals", &intervals, nb::arg("inputs"), nb::arg("level"), nb::arg("threads") = 0)
+      .def("quantiles", &quantiles_of, nb::arg("inputs"), nb::arg("probabilities"), nb::arg("threads") = 0)
       .def("attribute", &attribute_rows, nb::arg("inputs"))
       .def("importance", &importance_of, nb::arg("inputs"), nb::arg("threads") = 0)
       .def("to_c", &c_source, nb::arg("name"))

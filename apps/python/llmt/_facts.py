@@ -62,9 +62,10 @@ def coverage_of(model: dict[str, Any], level: float = 0.9) -> tuple[float, np.nd
 
     A row of a fold counts as held if the residual of its fold's model is at most the m-th smallest of the residuals of
     all other folds, m = ceil(level (N + 1)) of N: the folds are judged by one another, so the share may be below the
-    level. (I.1) also has the differences between the folds' models, and is therefore rather wider.
+    level. (I.2) also has the differences between the folds' models, and is therefore rather wider. Residuals are those
+    of the file, divided by the spread of the errors; a single fold has parts, which stand for folds.
     """
-    folds = model.get("intervals") or []
+    folds = [part for fold in model.get("intervals") or [] for part in fold.get("parts", [fold])]
     shares = []
     for o in range(len(model["outputs"])):
         of_folds = [

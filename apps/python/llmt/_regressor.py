@@ -3,6 +3,7 @@
 import os
 import threading
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -96,21 +97,11 @@ class TableRegressor(RegressorMixin, BaseEstimator):
             Of rows outside of the training ranges, for which no interval is honest, and of rows with a missing cell or
             a category as too few training rows had, or none. `check` says where they are.
         """
-        handle = self._model().handle
         level = share("coverage", coverage)
-        if not handle.has_intervals:
-            raise ValueError(
-                f"predict_interval needs rows that were held out, and this model has none: {self._why_no_intervals}"
-            )
+        handle = self._handle_with_intervals("predict_interval")
         values = self._table(X).values
         lower, upper, uncalibrated = handle.intervals(values, level, self._threads())
-        outside = np.flatnonzero(handle.extrapolation(values, self._threads())[:, 0] > 0)
-        if len(outside):
-            warnings.warn(
-                f"{len(outside)} of {len(values)} rows lie outside of the training ranges, the first is row {outside[0]}: "
-                "their intervals are not to be believed; check(X) names the columns",
-                stacklevel=2,
-            )
+        self._warn_of_rows_outside(values)
         if len(uncalibrated):
             warnings.warn(
                 f"{len(uncalibrated)} of {len(values)} rows have a missing cell or an unknown category, as too few training "
@@ -120,6 +111,55 @@ class TableRegressor(RegressorMixin, BaseEstimator):
             )
         ends = np.stack([lower, upper], axis=1)
         return ends[:, :, 0] if self._is_flat else ends
+
+    def predict_quantiles(self, X: Any, quantiles: Sequence[float] = (0.05, 0.5, 0.95)) -> np.ndarray:
+        """Values below which the given shares of the targets lie, ascending in each row (docs/algorithms/intervals.md).
+
+        Parameters
+        ----------
+        X : table, (rows, columns)
+            Inputs, as in `predict`.
+        quantiles : numbers between 0 and 1, ascending
+            0.5 stands for the prediction; 0.05 and 0.95 are the ends of the interval that holds 90 %.
+
+        Returns
+        -------
+        ndarray, (rows, quantiles), or (rows, quantiles, targets) where y had two dimensions
+
+        Raises
+        ------
+        ValueError
+            If nothing was held out in the fit, or too few rows for a quantile.
+
+        Warns
+        -----
+        UserWarning
+            Of rows outside of the training ranges, as `predict_interval`.
+        """
+        probabilities = [share("quantiles", quantile) for quantile in quantiles]
+        handle = self._handle_with_intervals("predict_quantiles")
+        values = self._table(X).values
+        of_targets = handle.quantiles(values, probabilities, self._threads())
+        self._warn_of_rows_outside(values)
+        stacked = np.stack(of_targets, axis=2)
+        return stacked[:, :, 0] if self._is_flat else stacked
+
+    def _handle_with_intervals(self, method: str) -> Any:
+        handle = self._model().handle
+        if not handle.has_intervals:
+            raise ValueError(
+                f"{method} needs rows that were held out, and this model has none: {self._why_no_intervals}"
+            )
+        return handle
+
+    def _warn_of_rows_outside(self, values: np.ndarray) -> None:
+        outside = np.flatnonzero(self._model().handle.extrapolation(values, self._threads())[:, 0] > 0)
+        if len(outside):
+            warnings.warn(
+                f"{len(outside)} of {len(values)} rows lie outside of the training ranges, the first is row {outside[0]}: "
+                "their intervals are not to be believed; check(X) names the columns",
+                stacklevel=3,
+            )
 
     def to_json(self) -> str:
         """The model as JSON text, as `llmt fit -o` writes it."""

@@ -181,7 +181,7 @@ class Tree:
     def standard_errors(self, leaf: Leaf, output: int = 0) -> tuple[float, np.ndarray]:
         """Standard errors of the intercept and of the slopes of a leaf.
 
-        Those of least squares over the rows of the leaf, (I.3) of docs/algorithms/intervals.md:
+        Those of least squares over the rows of the leaf, (I.6) of docs/algorithms/intervals.md:
             se_k^2 = RSS_i / (n_i - p_i) (T G_i^-1 T')_kk
         with T the step from the coefficients of deviations to those of the regressors. They take the tree as given.
         NaN where the leaf's rows do not determine the coefficient, where it was not selected, where as many

@@ -55,6 +55,10 @@ Json prediction_json(const Prediction& prediction, bool with_values) {
         target["low"] = column_of(prediction.bounds->lower, column);
         target["high"] = column_of(prediction.bounds->upper, column);
       }
+      for (std::size_t k = 0; k < prediction.probabilities.size() && !prediction.quantiles.empty(); ++k) {
+        target["quantiles"].push_back({{"probability", prediction.probabilities[k]},
+                                       {"values", column_of(prediction.quantiles[o], static_cast<Eigen::Index>(k))}});
+      }
     }
     json["targets"].push_back(std::move(target));
   }

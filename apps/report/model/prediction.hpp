@@ -20,9 +20,11 @@ struct Prediction {
   std::vector<Extrapolation> extrapolation;
   bool has_leverage = true;  ///< not of boosted models
   std::optional<Bounds> bounds;
-  Eigen::Index missing = 0;       ///< cells, as ModelInputs
-  Eigen::Index unknown = 0;       ///< as ModelInputs
-  Eigen::Index unseen_codes = 0;  ///< as ModelInputs
+  std::vector<double> probabilities = {};       ///< of the quantiles
+  std::vector<Eigen::MatrixXd> quantiles = {};  ///< one a target, rows x probabilities; empty: none
+  Eigen::Index missing = 0;                     ///< cells, as ModelInputs
+  Eigen::Index unknown = 0;                     ///< as ModelInputs
+  Eigen::Index unseen_codes = 0;                ///< as ModelInputs
   /// Root mean square errors of the targets that the table also holds, in the order of targets; NaN for the others.
   Eigen::VectorXd rmse;
 };

@@ -60,8 +60,9 @@ struct BoostVariant {
 /// How the sum of one output was made.
 struct BoostSummary {
   Eigen::Index rows = 0;               ///< that the sum is fitted to; equal rows count once
-  Eigen::Index held_out = 0;           ///< rows that decided the variant and the number of trees
+  Eigen::Index held_out = 0;           ///< rows that `rmse` is of
   double rmse = 0.0;                   ///< on these, of the trees fitted without them, in the output's unit; or NaN
+  double spread = 0.0;                 ///< standard deviation of the RMSE of the five parts of these rows; 0: one part
   std::string variant;                 ///< the one taken; "blend": a mean; "mean": see BoostOptions::mean_of_few
   std::vector<BoostVariant> compared;  ///< empty: symmetric trees, without a choice
   Eigen::Index trees = 0;
@@ -80,7 +81,7 @@ struct BoostResult {
 /// | rows from | rate | slopes | c | patience | held out | race | one tree | splits from |
 /// | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 /// | 10 | 0.05 | 3 | 3 | 100 | each fifth in turn | no | RA, to 100 inputs | all rows |
-/// | 500 | 0.05 | 3 | 3 | 200 | a fifth | no | RA or RD, to 100 inputs | all rows |
+/// | 500 | 0.05 | 3 | 3 | 200 | a fifth; each for the error | no | RA or RD, to 100 inputs | all rows |
 /// | 5000 | 0.05 | 5 | 1 | 50 | a fifth | yes | RA, to 32 inputs, 200 trees | all rows |
 /// | 10 000 | 0.07 | 5 | 1 | 50 | a fifth | yes | RA, to 32 inputs, 200 trees | all rows |
 /// | 50 000 | 0.07 | 5 | 1 | 50 | a fifth | yes | none | all rows |
@@ -93,7 +94,7 @@ struct BoostResult {
 /// the whole procedure, shares and number of trees chosen without the row. With more rows it is the mean of the sum and
 /// such a tree where the tree alone is better than the sum on the held-out rows.
 ///
-/// BoostedModel::half_widths() gives intervals, from the held-out rows' residuals.
+/// BoostedModel::intervals() gives intervals, from the held-out rows' residuals and their spread.
 ///
 /// Inputs may be missing (NaN). A category is taken as the indicators of its most frequent levels,
 /// `most_boosted_levels` of them. Weights are as for fit(); a row of

@@ -11,6 +11,7 @@
 
 #include "llmt/abi.hpp"
 #include "llmt/boosted_sum.hpp"
+#include "llmt/bounds.hpp"
 #include "llmt/partition.hpp"
 
 namespace llmt {
@@ -35,15 +36,20 @@ class BoostedModel {
   /// alone or among others.
   Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
-  /// Whether every sum has residuals.
+  /// Whether every sum has residuals of held-out rows.
   bool has_intervals() const;
 
-  /// Of each output the half width of prediction intervals that hold the fraction `level` (0.9, for example) of the
-  /// outputs: the ceil(level (n + 1))-th smallest of the n residuals, as in split conformal prediction (Vovk et al.
-  /// 2005). It is the same for all rows, and about right on average: the trees of all rows are a little better than
-  /// those of the residuals, whose rows decided where these stopped. Throws std::invalid_argument if there are no
-  /// residuals, too few for the level, or if the level is not between 0 and 1.
-  Eigen::VectorXd half_widths(double level) const;
+  /// Prediction intervals that hold the fraction `level` (0.9, for example) of the outputs, f(x) the prediction, s_p
+  /// the spread of part p of the held-out rows and S_i their n scaled residuals:
+  ///   lower, upper = f(x) -+ the floor((1 - level) (n + 1))-th largest of s_p(i)(x) S_i,
+  /// as in normalised split conformal prediction (Lei et al. 2018). They are about right: the trees of all rows are a
+  /// little better than those of the residuals, whose rows decided where these stopped. Throws std::invalid_argument if
+  /// there are no residuals, too few for the level, or if the level is not between 0 and 1, and as predict().
+  Bounds intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0) const;
+
+  /// The same for several levels.
+  std::vector<Bounds> intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<double>& levels,
+                                int max_threads = 0) const;
 
  private:
   std::vector<InputColumn> inputs_;
@@ -51,6 +57,11 @@ class BoostedModel {
   std::vector<double> deviations_;
   std::vector<BoostedSum> sums_;
 };
+
+/// Quantiles of each output, rows x probabilities; see quantiles_from(). Throws std::invalid_argument as
+/// levels_of_quantiles() and BoostedModel::intervals().
+std::vector<Eigen::MatrixXd> quantiles(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                       const std::vector<double>& probabilities, int max_threads = 0);
 
 /// How large a model is, over all outputs.
 struct BoostedSize {

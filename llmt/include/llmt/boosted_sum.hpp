@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "llmt/limits.hpp"
+#include "llmt/spread.hpp"
 
 namespace llmt {
 
@@ -58,14 +59,20 @@ struct BoostedTree {
   double smallest_share = 0.08;  ///< of a row on one side of a split, from 0 to 0.5; see BoostedSplit
 };
 
+/// Absolute residuals of a part of the held-out rows under trees that were fitted without them, each divided by the
+/// spread at its row, which was learnt from the other parts.
+struct SumResiduals {
+  std::vector<double> residuals;  ///< ascending
+  Spread spread = {};
+};
+
 /// The trees of one output: y = base + rate . sum of trees.
 struct BoostedSum {
   double base = 0.0;  ///< in the unit of the output
   double rate = 1.0;
   std::vector<BoostedFeature> features;
   std::vector<BoostedTree> trees;
-  /// Absolute residuals of held-out rows under trees that were fitted without them, ascending; empty: there are none.
-  std::vector<double> residuals = {};
+  std::vector<SumResiduals> held_out = {};  ///< for intervals; empty: there are none
 };
 
 }  // namespace llmt

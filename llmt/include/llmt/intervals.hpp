@@ -6,63 +6,73 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <string>
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/bounds.hpp"
 #include "llmt/model.hpp"
+#include "llmt/spread.hpp"
 
 namespace llmt {
 
-/// Lower and upper ends, rows x outputs.
-struct Bounds {
-  Eigen::MatrixXd lower;
-  Eigen::MatrixXd upper;
-  /// Rows that lack an input for which there were too few held-out rows like them for the level. Their intervals are
-  /// likely too narrow, see Intervals.
-  std::vector<Eigen::Index> uncalibrated = {};
+/// Held-out rows with one model and one spread: those of a fold, or of a part of the only fold.
+struct HeldOutPart {
+  std::size_t model = 0;       ///< which of Intervals::models() was fitted without the rows
+  Eigen::MatrixXd residuals;   ///< rows x outputs: absolute residuals, each divided by the spread at its row; ascending
+  Eigen::MatrixXd incomplete;  ///< the same of the rows that lack an input
+  std::vector<Spread> spreads = {};  ///< one an output, learnt from the other parts; empty: 1 everywhere
+  /// One an output: (I.3) of docs/algorithms/intervals.md, by how much the folds' models usually disagree, as a part of
+  /// the spread. Empty: by nothing, as a single model.
+  std::vector<double> disagreement = {};
 };
 
-/// CV+ prediction intervals (Barber, Candes, Ramdas & Tibshirani 2021): with R_i the absolute residual of row i under
-/// the model f_k(i) that was fitted without the row's fold, and n rows,
-///   lower = floor(a (n + 1))-th smallest of f_k(i)(x) - R_i,   upper = ceil((1 - a) (n + 1))-th smallest of f_k(i)(x)
-///   + R_i.
-/// The guarantee is a coverage of 1 - 2 a for exchangeable rows; in practice it is near 1 - a, the level that is asked
-/// for. With a single fold this is split conformal prediction, whose guarantee is 1 - a. Weights of rows are not used.
+/// Normalised CV+ prediction intervals (Barber, Candes, Ramdas & Tibshirani 2021; Lei et al. 2018): with f_k(i) the
+/// model that was fitted without the fold of row i, s_k(i) the spread of errors as the other folds' held-out rows tell
+/// it, S_i = |y_i - f_k(i)(x_i)| / s_k(i)(x_i), n rows and a = 1 - level,
+///   lower = floor(a (n + 1))-th smallest of f_k(i)(x) - s_k(i)(x) S_i,
+///   upper = floor(a (n + 1))-th largest of f_k(i)(x) + s_k(i)(x) S_i.
+/// So the width follows the size of the errors near x. The guarantee is a coverage of 1 - 2 a for exchangeable rows; in
+/// practice it is near 1 - a, the level that is asked for. A single fold is dealt to five parts, which share its model:
+/// the spread of a part is learnt from the others. This is split conformal prediction. Below 100 held-out rows the
+/// spread is 1. Weights of rows are not used.
 ///
 /// Rows that lack an input which the models use (an empty cell, an unknown category) err more than complete rows. The
-/// two kinds of rows are therefore calibrated apart: n and R_i are those of the held-out rows of the kind of x. If
+/// two kinds of rows are therefore calibrated apart: n and S_i are those of the held-out rows of the kind of x. If
 /// there are too few of the kind for the level, the interval is that of all held-out rows, as far as needed widened to
 /// the largest residuals of the kind. If there is none of the kind, it is that of all held-out rows.
-///
-/// Within a kind the width depends on the residuals of all its rows, not on the residuals near x. Where the noise
-/// differs between regions, or the loss between missing inputs, the coverage holds on average, not in each of them.
 class Intervals {
  public:
   /// No folds; predict() throws.
   Intervals() = default;
 
-  /// One model and one matrix of absolute residuals (rows x outputs) for each fold. `incomplete`: the same of the rows
-  /// that lack an input; empty: there are none. Throws std::invalid_argument if the numbers of folds, inputs, outputs
-  /// or levels differ, or a residual is negative or not finite.
+  /// Models of the folds and the parts of their held-out rows. Throws std::invalid_argument if the numbers of inputs,
+  /// outputs or levels of the models differ, a part names no model or has another number of outputs or spreads, a
+  /// residual is negative or not finite, or as check_spread().
+  Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts);
+
+  /// One model and one matrix of absolute residuals (rows x outputs) for each fold, without spreads. `incomplete`: the
+  /// same of the rows that lack an input; empty: there are none.
   Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> residuals,
             std::vector<Eigen::MatrixXd> incomplete = {});
 
   bool empty() const { return models_.empty(); }
   const std::vector<Model>& models() const { return models_; }
-  const std::vector<Eigen::MatrixXd>& residuals() const { return residuals_; }  ///< each column ascending
-  /// Residuals of the rows that lack an input; one matrix for each fold.
-  const std::vector<Eigen::MatrixXd>& incomplete_residuals() const { return incomplete_; }
+  const std::vector<HeldOutPart>& parts() const { return parts_; }  ///< in the order of their models
 
   /// Intervals that contain the fraction `level` (0.9, for example) of the outputs. Throws std::invalid_argument if
   /// there are no folds, the level is not between 0 and 1, or there are too few held-out rows of both kinds together
   /// for it, and as Model::predict().
   Bounds predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0) const;
 
+  /// The same for several levels, in the time of little more than one.
+  std::vector<Bounds> predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<double>& levels,
+                              int max_threads = 0) const;
+
  private:
   std::vector<Model> models_;
-  std::vector<Eigen::MatrixXd> residuals_;
-  std::vector<Eigen::MatrixXd> incomplete_;
+  std::vector<HeldOutPart> parts_;
 };
 
 /// A model and the intervals that were made with it.
@@ -70,6 +80,11 @@ struct ModelWithIntervals {
   Model model;
   Intervals intervals;  ///< may be empty
 };
+
+/// Quantiles of each output, rows x probabilities; see quantiles_from(). Throws std::invalid_argument as
+/// levels_of_quantiles() and Intervals::predict().
+std::vector<Eigen::MatrixXd> quantiles(const ModelWithIntervals& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                       const std::vector<double>& probabilities, int max_threads = 0);
 
 /// The text of to_json(model) with the intervals as one member more, if there are any. Throws std::invalid_argument if
 /// the intervals belong to another model: if a model of theirs has other numbers of inputs, outputs or levels, names

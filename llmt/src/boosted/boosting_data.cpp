@@ -47,10 +47,10 @@ struct DifferentRows {
   std::vector<double> weights;
 };
 
-DifferentRows different_rows(const GivenRows& given, int max_threads) {
+DifferentRows different_rows(const GivenRows& given) {
   const std::vector<Eigen::Index> rows = counted_rows(given);
-  const RowNumbers numbers = given.numbers ? at(*given.numbers, rows)
-                                           : number_rows(given.inputs.values, given.outputs.values, rows, max_threads);
+  const RowNumbers numbers =
+      given.numbers ? at(*given.numbers, rows) : number_rows(given.inputs.values, given.outputs.values, rows);
   const bool weighted = given.weights.size() > 0 && !given.are_counts;
   DifferentRows result;
   std::map<std::tuple<int, double, bool>, std::size_t> seen;
@@ -220,7 +220,7 @@ HoldOut part_apart(const std::vector<int>& parts, int part) {
 BoostingData boosting_data(const TrainingData& data, const BoostOptions& options) {
   check_options(options);
   const GivenRows given = checked(given_rows(data), {.max_threads = options.max_threads});
-  DifferentRows different = different_rows(given, options.max_threads);
+  DifferentRows different = different_rows(given);
   const Eigen::Index count = std::ssize(different.first);
   const bool few = count < fewest_boosted_rows;
   if (few && !options.mean_of_few) {

@@ -203,6 +203,13 @@ std::optional<BoostedTree> tree_of_all(const BoostingData& data, const Eigen::Ve
   return translated(fitted.model, data, all_rows(output.size()), tried.options.max_threads);
 }
 
+std::optional<Eigen::VectorXd> residuals_without(const BoostingData& data, const Eigen::VectorXd& output,
+                                                 const HoldOut& rows, const FitOptions& options, Work& work) {
+  const FitResult fitted =
+      fit_tree(rows_at(rows_of(data, output), {rows.train.begin(), rows.train.end()}), options, work);
+  return residuals_of(fitted.model, data, output, rows, options.max_threads);
+}
+
 SumPart part_of(const BoostedTree& tree, const Eigen::VectorXd& output, const BinnedRows& rows) {
   SumPart part{.rounds = {}, .start = {tree}};
   part.rounds.residuals = output - values_of(part.start, rows);

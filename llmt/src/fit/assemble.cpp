@@ -8,6 +8,7 @@
 #include "base/parallel.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "fit/choices/code_choice.hpp"
+#include "fit/equal_row_errors.hpp"
 #include "fit/output_range.hpp"
 #include "fit/trees/error_weights.hpp"
 #include "model/codes.hpp"
@@ -100,6 +101,7 @@ FittedPartition finish(const ChosenInputs& inputs, const Plan& plan, const Final
     const Eigen::VectorXd weights = error_weights(*training.table, served);
     guards = guard_output_range(training.folds, weights, threads, fold_partitions, choice.chosen);
   }
+  std::optional<EqualRowErrors> equal_rows = equal_row_errors(training, fold_partitions);
   if (!training.options.intervals) fold_partitions.clear();
   Candidate& candidate = choice.chosen.candidate;
   const bool fewer = candidate.leaves < grown_leaves;
@@ -120,6 +122,7 @@ FittedPartition finish(const ChosenInputs& inputs, const Plan& plan, const Final
   summary.cv_folds = std::ssize(training.folds);
   summary.held_out_rows = choice.held_out_rows;
   summary.range_guards = std::move(guards);
+  summary.equal_rows = std::move(equal_rows);
   summary.left_out = inputs.left_out;
   summary.input_steps = inputs.steps;
   FittedPartition fitted{{training.all.regressors, std::move(partition)}, std::move(summary), {}};

@@ -7,6 +7,7 @@
 #include "llmt/files.hpp"
 #include "llmt/limits.hpp"
 #include "model_files/model_json.hpp"
+#include "model_files/spread_files.hpp"
 
 namespace llmt {
 namespace {
@@ -59,6 +60,17 @@ Json of_tree(const BoostedTree& tree) {
   if (has_means) json["means"] = std::move(means);
   if (tree.smallest_share != BoostedTree().smallest_share) json["smallest_share"] = tree.smallest_share;
   return json;
+}
+
+// Without spreads as programs before them read it. Those find no residuals where there are some.
+void write_held_out(const std::vector<SumResiduals>& parts, Json& json) {
+  if (parts.size() == 1 && parts.front().spread.nodes.empty()) {
+    json["residuals"] = parts.front().residuals;
+    return;
+  }
+  for (const SumResiduals& part : parts) {
+    json["held_out"].push_back({{"residuals", part.residuals}, {"spread", json_of(part.spread)}});
+  }
 }
 
 InputColumn input_from(const JsonReader& json, double& deviation) {
@@ -134,7 +146,11 @@ BoostedSum sum_from(const JsonReader& json) {
     tree.smallest_share = entry.as("smallest_share", tree.smallest_share);
     sum.trees.push_back(std::move(tree));
   }
-  if (json.has("residuals")) sum.residuals = json.member("residuals").list<double>();
+  if (json.has("residuals")) sum.held_out.push_back({json.member("residuals").list<double>()});
+  if (!json.has("held_out")) return sum;
+  for (const JsonReader& part : json.member("held_out").elements()) {
+    sum.held_out.push_back({part.member("residuals").list<double>(), spread_from(part.member("spread"))});
+  }
   return sum;
 }
 
@@ -169,7 +185,7 @@ std::string to_json(const BoostedModel& model) {
     for (const BoostedTree& tree : sum.trees) trees.push_back(of_tree(tree));
     json["sums"].push_back(
         {{"base", sum.base}, {"rate", sum.rate}, {"features", std::move(features)}, {"trees", std::move(trees)}});
-    if (!sum.residuals.empty()) json["sums"].back()["residuals"] = sum.residuals;
+    write_held_out(sum.held_out, json["sums"].back());
   }
   return compact_text(json);
 }

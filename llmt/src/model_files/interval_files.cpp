@@ -1,13 +1,17 @@
 // Intervals in the text of their model.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
 #include <stdexcept>
+#include <utility>
 
 #include "llmt/files.hpp"
 #include "llmt/intervals.hpp"
 #include "llmt/limits.hpp"
 #include "model/interval_checks.hpp"
 #include "model_files/model_json.hpp"
+#include "model_files/spread_files.hpp"
 
 namespace llmt {
 namespace {
@@ -31,23 +35,49 @@ Json lists_of(const Eigen::MatrixXd& residuals) {
   return json;
 }
 
+// `json`: a fold, or one of its parts.
+HeldOutPart part_from(const JsonReader& json, std::size_t model) {
+  HeldOutPart part{.model = model, .residuals = residuals_from(json.member("residuals")), .incomplete = {}};
+  part.incomplete =
+      json.has(of_incomplete) ? residuals_from(json.member(of_incomplete)) : Eigen::MatrixXd(0, part.residuals.cols());
+  if (json.has("disagreement")) part.disagreement = json.member("disagreement").list<double>();
+  if (!json.has("spread")) return part;
+  for (const JsonReader& spread : json.member("spread").elements()) part.spreads.push_back(spread_from(spread));
+  return part;
+}
+
+Json json_of(const HeldOutPart& part) {
+  Json json = {{"residuals", lists_of(part.residuals)}};
+  if (part.incomplete.rows() > 0) json[of_incomplete] = lists_of(part.incomplete);
+  if (!part.disagreement.empty()) json["disagreement"] = part.disagreement;
+  for (const Spread& spread : part.spreads) json["spread"].push_back(json_of(spread));
+  return json;
+}
+
 Intervals intervals_from(const JsonReader& folds, const Model& model) {
   std::vector<Model> models;
-  std::vector<Eigen::MatrixXd> residuals;
-  std::vector<Eigen::MatrixXd> incomplete;
+  std::vector<HeldOutPart> parts;
   for (const JsonReader& fold : folds.elements()) {
+    if (fold.has("parts")) {
+      const std::vector<JsonReader> of_fold = fold.member("parts").elements();
+      for (const JsonReader& part : of_fold) parts.push_back(part_from(part, models.size()));
+    } else {
+      parts.push_back(part_from(fold, models.size()));
+    }
     models.push_back(model_from(fold.member("model")));
-    residuals.push_back(residuals_from(fold.member("residuals")));
-    incomplete.push_back(fold.has(of_incomplete) ? residuals_from(fold.member(of_incomplete))
-                                                 : Eigen::MatrixXd(0, residuals.back().cols()));
   }
   try {
-    Intervals intervals(std::move(models), std::move(residuals), std::move(incomplete));
+    Intervals intervals(std::move(models), std::move(parts));
     check_belong(intervals.models(), model);
     return intervals;
   } catch (const std::invalid_argument& error) {
     folds.fail(error.what());
   }
+}
+
+// Whether a fold is written as programs before spreads read it. Those find no residuals where it is not.
+bool is_plain(const std::vector<HeldOutPart>& of_fold) {
+  return of_fold.size() == 1 && of_fold.front().spreads.empty() && of_fold.front().disagreement.empty();
 }
 
 }  // namespace
@@ -62,10 +92,14 @@ std::string to_json(const Model& model, const Intervals& intervals) {
   Json json = json_of(model);
   json["intervals"] = Json::array();
   for (std::size_t k = 0; k < intervals.models().size(); ++k) {
-    Json fold = {{"residuals", lists_of(intervals.residuals()[k])}, {"model", json_of(intervals.models()[k])}};
-    if (const Eigen::MatrixXd& incomplete = intervals.incomplete_residuals()[k]; incomplete.rows() > 0) {
-      fold[of_incomplete] = lists_of(incomplete);
+    std::vector<HeldOutPart> of_fold;
+    std::ranges::copy_if(intervals.parts(), std::back_inserter(of_fold),
+                         [&](const HeldOutPart& part) { return part.model == k; });
+    Json fold = is_plain(of_fold) ? json_of(of_fold.front()) : Json();
+    if (!is_plain(of_fold)) {
+      for (const HeldOutPart& part : of_fold) fold["parts"].push_back(json_of(part));
     }
+    fold["model"] = json_of(intervals.models()[k]);
     json["intervals"].push_back(std::move(fold));
   }
   return model_text(json);

@@ -165,13 +165,14 @@ std::vector<double> coverage(std::uint64_t seed, double level) {
   const llmt::BoostedModel model = llmt::fit_boosted(friedman(600, seed), {.seed = seed}).model;
   const llmt::TrainingData fresh = friedman(2000, seed + 1000);
   const Eigen::VectorXd predicted = model.predict(fresh.inputs);
-  const double width = model.half_widths(level)(0);
+  const llmt::Bounds bounds = model.intervals(fresh.inputs, level);
   std::vector<Eigen::Index> order(2000);
   std::iota(order.begin(), order.end(), 0);
   std::ranges::sort(order, {}, [&](Eigen::Index row) { return predicted(row); });
   std::vector<double> inside(6, 0.0);
   for (std::size_t k = 0; k < order.size(); ++k) {
-    if (std::abs(fresh.outputs(order[k], 0) - predicted(order[k])) > width) continue;
+    const double output = fresh.outputs(order[k], 0);
+    if (output < bounds.lower(order[k], 0) || output > bounds.upper(order[k], 0)) continue;
     inside[k / 400] += 1.0 / 400.0;
     inside[5] += 1.0 / 2000.0;
   }
@@ -192,33 +193,54 @@ TEST(BoostedModel, HasIntervalsThatHoldTheLevelInEveryFifth) {
 
 TEST(BoostedModel, HasHalfWidthsThatAreOrderStatisticsOfResiduals) {
   llmt::BoostedSum sum{.base = 1.0, .features = {{.first = 0}}, .trees = {}};
-  const auto with = [&](std::vector<double> residuals) {
-    sum.residuals = std::move(residuals);
+  const auto with = [&](std::vector<llmt::SumResiduals> held_out) {
+    sum.held_out = std::move(held_out);
     return llmt::BoostedModel({{.name = "x", .low = 0.0, .high = 1.0}}, {{.name = "y", .low = 0.0, .high = 1.0}}, {1.0},
                               {sum});
   };
-  const llmt::BoostedModel model = with({1, 2, 3, 4, 5, 6, 7, 8, 9});
-  EXPECT_EQ(model.half_widths(0.9)(0), 9.0);
-  EXPECT_EQ(model.half_widths(0.5)(0), 5.0);
-  EXPECT_EQ(model.half_widths(0.41)(0), 5.0);
-  EXPECT_EQ(model.half_widths(0.01)(0), 1.0);
-  EXPECT_THROW(model.half_widths(0.91), std::invalid_argument);
-  EXPECT_THROW(model.half_widths(1.0), std::invalid_argument);
+  const auto half_width = [](const llmt::BoostedModel& model, double level, double x = 0.0) {
+    const llmt::Bounds bounds = model.intervals(Eigen::MatrixXd::Constant(1, 1, x), level);
+    EXPECT_EQ(bounds.lower(0, 0) + bounds.upper(0, 0), 2.0);
+    return bounds.upper(0, 0) - 1.0;
+  };
+  const llmt::BoostedModel model = with({{{1, 2, 3, 4, 5, 6, 7, 8, 9}}});
+  EXPECT_EQ(half_width(model, 0.9), 9.0);
+  EXPECT_EQ(half_width(model, 0.5), 5.0);
+  EXPECT_EQ(half_width(model, 0.41), 5.0);
+  EXPECT_EQ(half_width(model, 0.01), 1.0);
+  EXPECT_THROW(half_width(model, 0.91), std::invalid_argument);
+  EXPECT_THROW(half_width(model, 1.0), std::invalid_argument);
   EXPECT_FALSE(with({}).has_intervals());
-  EXPECT_THROW(with({}).half_widths(0.5), std::invalid_argument);
-  EXPECT_THROW(with({2.0, 1.0}), std::invalid_argument);
-  EXPECT_THROW(with({-1.0}), std::invalid_argument);
+  EXPECT_THROW(half_width(with({}), 0.5), std::invalid_argument);
+  EXPECT_THROW(with({{{2.0, 1.0}}}), std::invalid_argument);
+  EXPECT_THROW(with({{{-1.0}}}), std::invalid_argument);
+  // Two parts: the second one says that errors are four times as large where x > 0.5.
+  const llmt::Spread spread{
+      .nodes = {{.column = 0, .threshold = 0.5, .left = 1, .right = 2}, {.factor = 0.5}, {.factor = 2.0}},
+      .levels = {{}}};
+  const llmt::BoostedModel two = with({{{1, 2, 3, 4, 5}}, {{2, 4, 6, 8}, spread}});
+  EXPECT_EQ(half_width(two, 0.5, 0.5), 3.0);  // 1 1 2 2 3 3 4 4 5
+  EXPECT_EQ(half_width(two, 0.5, 0.6), 5.0);  // 1 2 3 4 4 5 8 12 16
+  EXPECT_EQ(half_width(two, 0.9, 0.6), 16.0);
 }
 
+// Of rows that are many enough a residual is that of a row, by the spread there.
 TEST(FitBoosted, KeepsTheResidualsOfHeldOutRows) {
-  llmt::TrainingData data = friedman(300, 8);
-  for (Eigen::Index row = 0; row < 60; ++row) data.held_out.push_back(row);
-  const llmt::BoostedModel model = llmt::fit_boosted(data, {.max_rounds = 40}).model;
-  Eigen::VectorXd expected = (model.predict(data.inputs.topRows(60)) - data.outputs.topRows(60)).cwiseAbs();
-  std::ranges::sort(expected);
-  const std::vector<double>& found = model.sums()[0].residuals;
-  ASSERT_EQ(found.size(), 60U);
-  for (Eigen::Index k = 0; k < 60; ++k) EXPECT_NEAR(found[k], expected(k), 1e-4);
+  for (const Eigen::Index held_out : {60, 120}) {
+    llmt::TrainingData data = friedman(400, 8);
+    for (Eigen::Index row = 0; row < held_out; ++row) data.held_out.push_back(row);
+    const llmt::BoostedModel model = llmt::fit_boosted(data, {.max_rounds = 40}).model;
+    const Eigen::VectorXd predicted = model.predict(data.inputs).topRows(held_out);
+    Eigen::Index found = 0;
+    for (const llmt::SumResiduals& part : model.sums()[0].held_out) {
+      for (Eigen::Index row = 0; row < held_out; ++row) {
+        const double expected = std::abs(predicted(row) - data.outputs(row, 0)) /
+                                llmt::spread_at(part.spread, data.inputs, row, predicted(row));
+        found += std::ranges::any_of(part.residuals, [&](double each) { return std::abs(each - expected) < 1e-4; });
+      }
+    }
+    EXPECT_GE(found, held_out);
+  }
 }
 
 TEST(FitBoosted, EndsWhereTheProgressSaysSo) {
@@ -326,7 +348,8 @@ TEST(BoostedFile, SaysWhereItIsWrong) {
   for (int slope = 0; slope <= llmt::most_leaf_slopes; ++slope) steep.insert(steep.end(), {0, 1.0});
   expect_fault(changed("/sums/0/trees/0/leaves/0", steep), "more than 12 slopes");
   expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 1.0, 2.0, -1, 1.0}), "there is no feature -1");
-  expect_fault(changed("/sums/0/residuals/2", -1.0), "/sums/0/residuals/2: residuals are not finite");
+  expect_fault(changed("/sums/0/residuals", {1.0, 2.0, -1.0}),
+               "/sums/0/held_out/0/residuals/2: residuals are not finite");
   expect_fault(changed("/sums/1", Json::object()), "/sums/1");
   expect_fault("{}", "not a file of a boosted model");
 }

@@ -33,8 +33,13 @@ TEST(HeldOutRows, AreThoseOfTheIntervals) {
   for (std::size_t f = 0; f < held_out.size(); ++f) {
     covered += held_out[f].size();
     const Eigen::MatrixXd predicted = result.intervals.models()[f].predict(inputs(held_out[f], Eigen::all));
-    const Eigen::VectorXd found = (outputs(held_out[f], Eigen::all) - predicted).cwiseAbs().col(0);
-    const auto kept = result.intervals.residuals()[f].col(0);
+    Eigen::VectorXd found = (outputs(held_out[f], Eigen::all) - predicted).cwiseAbs().col(0);
+    const llmt::HeldOutPart& part = result.intervals.parts()[f];
+    const Eigen::MatrixXd x = inputs(held_out[f], Eigen::all);
+    for (Eigen::Index i = 0; i < found.size() && !part.spreads.empty(); ++i) {
+      found(i) /= llmt::spread_at(part.spreads[0], x, i, predicted(i, 0));
+    }
+    const auto kept = part.residuals.col(0);
     for (const double residual : kept) EXPECT_NE(std::ranges::find(found, residual), found.end());
     for (const double residual : found) EXPECT_NE(std::ranges::find(kept, residual), kept.end());
     EXPECT_EQ(std::ranges::count(held_out[f], 40), 0);

@@ -239,8 +239,9 @@ TEST(Counts, AreNotTakenFromLargeNorFromBrokenWeights) {
   // A fold of counted rows has 601 rows in all folds, one of weighted rows 588.
   const auto residuals = [](const llmt::FitResult& result) {
     Eigen::Index count = 0;
-    for (const Eigen::MatrixXd& of_fold : result.intervals.residuals()) count += of_fold.rows();
-    for (const Eigen::MatrixXd& of_fold : result.intervals.incomplete_residuals()) count += of_fold.rows();
+    for (const llmt::HeldOutPart& part : result.intervals.parts()) {
+      count += part.residuals.rows() + part.incomplete.rows();
+    }
     return count;
   };
   EXPECT_EQ(residuals(model_of(1.0)), rows - 12 + 15);

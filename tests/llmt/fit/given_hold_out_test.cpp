@@ -104,7 +104,11 @@ TEST(GivenHoldOut, IsTheFoldOfAFitOfManyRows) {
   EXPECT_EQ(given.summary.partitions[0].chosen.candidate, dealt.summary.partitions[0].chosen.candidate);
   EXPECT_EQ(given.summary.partitions[0].chosen.rmse, dealt.summary.partitions[0].chosen.rmse);
   EXPECT_TRUE(to_json(given.intervals.models()[0]) == to_json(dealt.intervals.models()[0]));
-  EXPECT_EQ(given.intervals.residuals(), dealt.intervals.residuals());
+  ASSERT_EQ(given.intervals.parts().size(), 5U);
+  for (std::size_t p = 0; p < 5; ++p) {
+    EXPECT_EQ(given.intervals.parts()[p].residuals, dealt.intervals.parts()[p].residuals);
+    EXPECT_EQ(given.intervals.parts()[p].spreads, dealt.intervals.parts()[p].spreads);
+  }
   const Eigen::MatrixXd asked = data.inputs.topRows(1000);
   EXPECT_EQ(given.model.predict(asked), given.intervals.models()[0].predict(asked));
 }
@@ -116,15 +120,19 @@ TEST(GivenHoldOut, IntervalsAreOfItsResiduals) {
   EXPECT_EQ(result.summary.partitions[0].held_out_rows, 150);
   const Eigen::MatrixXd outputs = data.outputs(data.held_out, Eigen::all);
   const Eigen::MatrixXd predicted = result.model.predict(data.inputs(data.held_out, Eigen::all));
-  const Eigen::VectorXd errors = (outputs - predicted).cwiseAbs();
-  ASSERT_EQ(result.intervals.residuals().size(), 1U);
-  EXPECT_EQ(result.intervals.residuals()[0].rows(), 150);
-  std::vector<double> found(result.intervals.residuals()[0].reshaped().begin(),
-                            result.intervals.residuals()[0].reshaped().end());
-  std::vector<double> expected(errors.begin(), errors.end());
-  std::ranges::sort(found);
-  std::ranges::sort(expected);
-  EXPECT_EQ(found, expected);
+  const Eigen::MatrixXd x = data.inputs(data.held_out, Eigen::all);
+  // Each residual is that of one row, by the spread there.
+  std::vector<bool> is_found(150, false);
+  for (const llmt::HeldOutPart& part : result.intervals.parts()) {
+    EXPECT_EQ(part.model, 0U);
+    for (const double residual : part.residuals.reshaped()) {
+      for (Eigen::Index row = 0; row < 150; ++row) {
+        const double spread = part.spreads.empty() ? 1.0 : llmt::spread_at(part.spreads[0], x, row, predicted(row, 0));
+        if (residual == std::abs(outputs(row, 0) - predicted(row, 0)) / spread) is_found[row] = true;
+      }
+    }
+  }
+  EXPECT_EQ(std::ranges::count(is_found, true), 150);
   EXPECT_NEAR(result.summary.partitions[0].chosen.rmse, llmt::rmse(predicted, outputs)(0), 1e-12);
 }
 

@@ -136,7 +136,7 @@ TEST(Codes, IntervalsOfOtherCodesAreRefused) {
   const llmt::FitResult result = fitted();
   std::vector<llmt::Model> folds;
   for (const llmt::Model& fold : result.intervals.models()) folds.push_back(coded(fold));
-  const llmt::Intervals intervals(folds, result.intervals.residuals());
+  const llmt::Intervals intervals(folds, result.intervals.parts());
   const std::string path = testing::TempDir() + "codes_test.json";
   EXPECT_NO_THROW(save(coded(result.model), intervals, path));
   EXPECT_FALSE(llmt::load_with_intervals(path).intervals.empty());

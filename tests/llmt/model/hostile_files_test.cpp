@@ -226,7 +226,7 @@ TEST(HostileFiles, IntervalsOfAnotherModelAreRefused) {
   llmt::FitResult renamed = two;
   std::vector<llmt::Model> models;
   for (const llmt::Model& model : two.intervals.models()) models.push_back(model.named({"a", "sort"}, {"u", "v"}));
-  renamed.intervals = llmt::Intervals(models, two.intervals.residuals());
+  renamed.intervals = llmt::Intervals(models, two.intervals.parts());
   EXPECT_NE(oracle::thrown([&] {
               llmt::save(two.model, renamed.intervals, own);
             }).find("input 1 of fold 0 is \"sort\", that of the model \"kind\""),
@@ -253,7 +253,9 @@ TEST(HostileFiles, IntervalsOfTheWrongTypeAreRefused) {
         "[{\"model\":" + model + ",\"residuals\":[[1],[-1]]}]", "[{\"model\":" + model + ",\"residuals\":[1e400]}]",
         "[{\"model\":" + model + ",\"residuals\":[[1],[1]],\"residuals_incomplete\":7}]",
         "[{\"model\":" + model + ",\"residuals\":[[1],[1]],\"residuals_incomplete\":[[1]]}]",
-        "[{\"model\":" + model + ",\"residuals\":[[1],[1]],\"residuals_incomplete\":[[1],[-1]]}]"}) {
+        "[{\"model\":" + model + ",\"residuals\":[[1],[1]],\"residuals_incomplete\":[[1],[-1]]}]",
+        "[{\"model\":" + model + ",\"parts\":7}]", "[{\"model\":" + model + ",\"parts\":[]}]",
+        "[{\"model\":" + model + ",\"parts\":[{\"residuals\":[[1],[1]],\"spread\":[{\"nodes\":[]}]}]}]"}) {
     llmt::write_file(path, model.substr(0, model.rfind('}')) + ",\"intervals\":" + intervals + "}");
     EXPECT_EQ(error_of_file(path).find(path + ": /intervals"), 0U) << error_of_file(path) << intervals.substr(0, 40);
   }

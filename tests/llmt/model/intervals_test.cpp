@@ -49,11 +49,18 @@ Ends sorted_ends(const llmt::FitResult& fit, const Sample& train, bool complete,
   std::vector<double> upper;
   for (std::size_t f = 0; f < held_out.size(); ++f) {
     const llmt::Model& model = fit.intervals.models()[f];
+    const std::vector<llmt::Spread>& spreads = fit.intervals.parts()[f].spreads;
+    const auto spread = [&](const Eigen::MatrixXd& at, double prediction) {
+      return spreads.empty() ? 1.0 : llmt::spread_at(spreads[0], at, 0, prediction);
+    };
+    const double predicted = model.predict(x)(0, 0);
     for (const Eigen::Index row : held_out[f]) {
       if (!(is_incomplete(train, row) ? incomplete : complete)) continue;
-      const double residual = std::abs(train.y(row, 0) - model.predict(train.x.row(row))(0, 0));
-      lower.push_back(model.predict(x)(0, 0) - residual);
-      upper.push_back(model.predict(x)(0, 0) + residual);
+      const Eigen::MatrixXd at = train.x.row(row);
+      const double of_row = model.predict(at)(0, 0);
+      const double residual = std::abs(train.y(row, 0) - of_row) / spread(at, of_row);
+      lower.push_back(predicted - residual * spread(x, predicted));
+      upper.push_back(predicted + residual * spread(x, predicted));
     }
   }
   std::ranges::sort(lower);
@@ -163,9 +170,10 @@ TEST(Intervals, ReadBackWithBothKindsOfRows) {
   ASSERT_EQ(read.models().size(), fit.intervals.models().size());
   Eigen::Index lacks = 0;
   for (std::size_t f = 0; f < read.models().size(); ++f) {
-    EXPECT_EQ(read.residuals()[f], fit.intervals.residuals()[f]);
-    EXPECT_EQ(read.incomplete_residuals()[f], fit.intervals.incomplete_residuals()[f]);
-    lacks += read.incomplete_residuals()[f].rows();
+    EXPECT_EQ(read.parts()[f].residuals, fit.intervals.parts()[f].residuals);
+    EXPECT_EQ(read.parts()[f].incomplete, fit.intervals.parts()[f].incomplete);
+    EXPECT_EQ(read.parts()[f].spreads, fit.intervals.parts()[f].spreads);
+    lacks += read.parts()[f].incomplete.rows();
   }
   EXPECT_EQ(lacks, count_incomplete(train));
   const Sample whole = lacking(200, 0.0, 11);

@@ -145,7 +145,15 @@ void check_boosted(const std::vector<InputColumn>& inputs, const std::vector<Out
     const std::string pointer = fmt::format("/sums/{}", o);
     if (!std::isfinite(sum.base)) fail(pointer, "base is not finite");
     if (!std::isfinite(sum.rate) || sum.rate <= 0.0 || sum.rate > 1.0) fail(pointer, "rate is not in (0, 1]");
-    check_residuals(sum.residuals, pointer);
+    for (std::size_t p = 0; p < sum.held_out.size(); ++p) {
+      const std::string of_part = fmt::format("{}/held_out/{}", pointer, p);
+      check_residuals(sum.held_out[p].residuals, of_part);
+      try {
+        check_spread(sum.held_out[p].spread, inputs);
+      } catch (const std::invalid_argument& error) {
+        fail(of_part, error.what());
+      }
+    }
     for (std::size_t k = 0; k < sum.features.size(); ++k) {
       check_feature(sum.features[k], inputs, fmt::format("{}/features/{}", pointer, k));
     }

@@ -14,6 +14,7 @@
 #include "boosted/model/boosted_checks.hpp"
 #include "boosted/model/symmetric_table.hpp"
 #include "boosted/model/transition.hpp"
+#include "spread/scaled_residuals.hpp"
 
 namespace llmt {
 namespace {
@@ -233,26 +234,45 @@ Eigen::MatrixXd BoostedModel::predict(const Eigen::Ref<const Eigen::MatrixXd>& i
 }
 
 bool BoostedModel::has_intervals() const {
-  return std::ranges::none_of(sums_, [](const BoostedSum& sum) { return sum.residuals.empty(); });
+  return std::ranges::none_of(sums_, [](const BoostedSum& sum) { return sum.held_out.empty(); });
 }
 
-Eigen::VectorXd BoostedModel::half_widths(double level) const {
-  if (!(level > 0.0 && level < 1.0)) {
-    throw std::invalid_argument(
-        fmt::format("llmt::BoostedModel::half_widths: level is {}, it must lie between 0 and 1", level));
+Bounds BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads) const {
+  return intervals(inputs, std::vector<double>{level}, max_threads).front();
+}
+
+std::vector<Bounds> BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                            const std::vector<double>& levels, int max_threads) const {
+  const Eigen::MatrixXd predicted = predict(inputs, max_threads);
+  std::vector<Bounds> bounds(levels.size(), Bounds{predicted, predicted});
+  for (Eigen::Index o = 0; o < num_outputs(); ++o) {
+    const std::vector<SumResiduals>& parts = sums_[o].held_out;
+    Eigen::Index rows = 0;
+    for (const SumResiduals& part : parts) rows += std::ssize(part.residuals);
+    for (const double level : levels) check_level("llmt::BoostedModel::intervals", level, rows);
+    const RowBlocks blocks{inputs.rows(), rows_at_once};
+    parallel_for(blocks.count(), max_threads, [&](Eigen::Index block) {
+      const auto [begin, end] = blocks[block];
+      std::vector<ScaledResiduals> scaled(parts.size());
+      for (Eigen::Index row = begin; row < end; ++row) {
+        for (std::size_t p = 0; p < parts.size(); ++p) {
+          scaled[p] = {parts[p].residuals, 0.0, spread_at(parts[p].spread, inputs, row, predicted(row, o))};
+        }
+        for (std::size_t k = 0; k < levels.size(); ++k) {
+          const double width = largest_value(scaled, values_outside(levels[k], rows));
+          bounds[k].lower(row, o) -= width;
+          bounds[k].upper(row, o) += width;
+        }
+      }
+    });
   }
-  Eigen::VectorXd widths(num_outputs());
-  for (std::size_t o = 0; o < sums_.size(); ++o) {
-    const std::vector<double>& residuals = sums_[o].residuals;
-    const double rank = std::ceil(level * static_cast<double>(residuals.size() + 1) - 1e-9);
-    if (rank > static_cast<double>(residuals.size())) {
-      throw std::invalid_argument(
-          fmt::format("llmt::BoostedModel::half_widths: {} held-out residuals of \"{}\" are too few for the level {}",
-                      residuals.size(), outputs_[o].name, level));
-    }
-    widths(static_cast<Eigen::Index>(o)) = residuals[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
-  }
-  return widths;
+  return bounds;
+}
+
+std::vector<Eigen::MatrixXd> quantiles(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                       const std::vector<double>& probabilities, int max_threads) {
+  return quantiles_from(model.intervals(inputs, levels_of_quantiles(probabilities), max_threads),
+                        model.predict(inputs, max_threads), probabilities);
 }
 
 }  // namespace llmt

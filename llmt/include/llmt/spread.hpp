@@ -1,0 +1,45 @@
+/// \file
+/// How large the errors of a model are near a row, for prediction intervals: a small tree.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "llmt/abi.hpp"
+#include "llmt/partition.hpp"
+
+namespace llmt {
+
+/// A node of a spread: a split, or a leaf.
+struct SpreadNode {
+  int column = 0;             ///< of a split: an input; the number of inputs stands for the prediction
+  double threshold = 0.0;     ///< a value of at most this goes to the left; of a category, the value of its level
+  bool missing_left = false;  ///< side of rows whose value is missing
+  int left = -1;              ///< index of a later node; -1: a leaf
+  int right = -1;             ///< as `left`
+  double factor = 1.0;        ///< of a leaf: mean absolute error of its rows, divided by that of all rows
+
+  bool is_leaf() const { return left < 0; }
+  bool operator==(const SpreadNode&) const = default;
+};
+
+/// The spread sigma(x) of the errors of a model relative to their mean size. Without nodes it is 1 everywhere.
+struct Spread {
+  std::vector<SpreadNode> nodes = {};  ///< the first one is the root
+  /// One list an input: of a category the value of each of its levels and, last, that of any other one; empty for
+  /// numbers. Empty without nodes.
+  std::vector<std::vector<double>> levels = {};
+
+  bool operator==(const Spread&) const = default;
+};
+
+/// The spread at a row of `inputs`, whose model predicts `prediction` there. Categories are positions in their levels.
+double spread_at(const Spread& spread, const Eigen::Ref<const Eigen::MatrixXd>& inputs, Eigen::Index row,
+                 double prediction);
+
+/// Throws std::invalid_argument if a spread does not fit a model with these inputs: a number of lists or of values, a
+/// tree that is none, a column out of range, a number that is not finite, a factor that is not positive or beyond a
+/// million.
+void check_spread(const Spread& spread, const std::vector<InputColumn>& inputs);
+
+}  // namespace llmt

@@ -1,0 +1,43 @@
+#include "model_files/spread_files.hpp"
+
+namespace llmt {
+
+Json json_of(const Spread& spread) {
+  Json nodes = Json::array();
+  for (const SpreadNode& node : spread.nodes) {
+    if (node.is_leaf()) {
+      nodes.push_back(Json::array({node.factor}));
+    } else {
+      nodes.push_back({node.column, node.threshold, node.missing_left ? 1 : 0, node.left, node.right});
+    }
+  }
+  Json json = {{"nodes", std::move(nodes)}};
+  if (!spread.levels.empty()) json["levels"] = spread.levels;
+  return json;
+}
+
+Spread spread_from(const JsonReader& json) {
+  Spread spread;
+  for (const JsonReader& entry : json.member("nodes").elements()) {
+    const std::vector<JsonReader> parts = entry.elements();
+    SpreadNode& node = spread.nodes.emplace_back();
+    if (parts.size() == 1) {
+      node.factor = parts[0].as<double>();
+      continue;
+    }
+    if (parts.size() != 5) entry.fail("a leaf of a spread has 1 number, a split 5");
+    const int side = parts[2].as<int>();
+    if (side != 0 && side != 1) parts[2].fail("0 or 1 is needed");
+    node.column = parts[0].as<int>();
+    node.threshold = parts[1].as<double>();
+    node.missing_left = side == 1;
+    node.left = parts[3].as<int>();
+    node.right = parts[4].as<int>();
+    if (node.left < 0) parts[3].fail("it must not be negative");
+  }
+  if (!json.has("levels")) return spread;
+  for (const JsonReader& values : json.member("levels").elements()) spread.levels.push_back(values.list<double>());
+  return spread;
+}
+
+}  // namespace llmt
