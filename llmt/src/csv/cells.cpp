@@ -10,20 +10,6 @@
 #include <limits>
 #include <utility>
 
-#include "llmt/csv.hpp"
-
-namespace llmt {
-
-bool says_missing(std::string_view text) {
-  constexpr std::array<std::string_view, 6> marks = {"", "na", "n/a", "nan", "null", "?"};
-  const auto same = [](char c, char mark) { return c == mark || (c >= 'A' && c <= 'Z' && c - 'A' + 'a' == mark); };
-  return std::ranges::any_of(marks, [&](std::string_view mark) {
-    return std::equal(text.begin(), text.end(), mark.begin(), mark.end(), same);
-  });
-}
-
-}  // namespace llmt
-
 namespace llmt::csv {
 namespace {
 
@@ -204,6 +190,14 @@ std::string byte_not_utf8(std::string_view text) {
   return valid == text.size() ? "" : fmt::format("byte 0x{:02x}", static_cast<unsigned char>(text[valid]));
 }
 
+bool is_missing(std::string_view text) {
+  constexpr std::array<std::string_view, 6> marks = {"", "na", "n/a", "nan", "null", "?"};
+  const auto same = [](char c, char mark) { return c == mark || (c >= 'A' && c <= 'Z' && c - 'A' + 'a' == mark); };
+  return std::ranges::any_of(marks, [&](std::string_view mark) {
+    return std::equal(text.begin(), text.end(), mark.begin(), mark.end(), same);
+  });
+}
+
 bool is_blank(std::string_view text) { return text.find_first_not_of(blanks) == std::string_view::npos; }
 
 std::string unquoted(std::string_view field) {
@@ -243,7 +237,7 @@ Cell read_cell(const char*& cursor, const char* end, char separator, const Numbe
   const char* const field = std::exchange(cursor, field_end(begin, end, separator));
   const std::string_view text = bare(std::string_view(field, cursor - field));
   if (text.empty()) return Cell::missing;
-  if (says_missing(text)) return Cell::marked;
+  if (is_missing(text)) return Cell::marked;
   if (numbers.thousands && is_number_with_thousands(text, mark, value)) return Cell::number;
   if (!is_number(text, mark, value)) {
     if (is_number_with_other_mark(text, mark)) return Cell::other_mark;

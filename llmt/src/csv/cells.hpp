@@ -42,6 +42,9 @@ struct Record {
 };
 Record record_at(const char* begin, const char* end, char separator);
 
+/// Whether a text without outer blanks says that there is no value, see says_missing().
+bool is_missing(std::string_view text);
+
 /// Nothing but blanks, which are spaces, tabs and carriage returns.
 bool is_blank(std::string_view text);
 

@@ -88,6 +88,8 @@ Eigen::Index rows_of_task(Eigen::Index rows) { return std::max<Eigen::Index>(409
 
 }  // namespace
 
+bool says_missing(std::string_view text) { return csv::is_missing(text); }
+
 CsvNumbers Csv::read_numbers(std::span<const std::string> columns, int max_threads) const {
   const Request request = request_of(*this, columns);
   const char* const end = text_.data() + text_.size();

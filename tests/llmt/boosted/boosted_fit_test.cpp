@@ -316,14 +316,16 @@ void expect_fault(const std::string& text, const std::string& words) {
 TEST(BoostedFile, SaysWhereItIsWrong) {
   using Json = nlohmann::ordered_json;
   const llmt::TrainingData data = mixed(600);
-  const Json good = Json::parse(to_json(llmt::fit_boosted(data, {.max_rounds = 3}).model));
+  Json good = Json::parse(to_json(llmt::fit_boosted(data, {.max_rounds = 3}).model));
+  good["sums"][0]["trees"][0].erase("means");  // its leaves are changed
   const auto changed = [&](const std::string& pointer, const Json& value) {
     Json bad = good;
     bad[Json::json_pointer(pointer)] = value;
     return bad.dump();
   };
   expect_fault(changed("/format", "llmt-model"), "not a file of a boosted model");
-  expect_fault(changed("/version", 2), "version 2 of the format");
+  expect_fault(changed("/version", 3), "version 3 of the format");
+  expect_fault(changed("/version", 0), "version 0 of the format");
   expect_fault(changed("/inputs/0/deviation", 0.0), "/inputs/0: deviation is not a positive number");
   expect_fault(changed("/inputs/1/name", "a"), "/inputs/1: its name is there twice");
   expect_fault(changed("/sums/0/rate", 2.0), "/sums/0: rate is not in (0, 1]");
@@ -335,6 +337,12 @@ TEST(BoostedFile, SaysWhereItIsWrong) {
   expect_fault(changed("/sums/0/trees/0/splits/0/4", -2000000000), "is no child");
   expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 2.0}), "/sums/0/trees/0/leaves/0: a leaf has 3 numbers");
   expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 3.0, 2.0}), "low and high are no range");
+  expect_fault(changed("/sums/0/trees/0/splits/0/3", 1.01),
+               "/sums/0/trees/0/splits/0: missing_left is not from 0 to 1");
+  expect_fault(changed("/sums/0/trees/0/splits/0/3", -0.01), "missing_left is not from 0 to 1");
+  const std::size_t means = good["sums"][0]["trees"][1]["means"].size();
+  expect_fault(changed("/sums/0/trees/1/means", {1.0}),
+               "/sums/0/trees/1/means: 1 means of " + std::to_string(means) + " slopes");
   expect_fault(changed("/sums/0/trees/0/smallest_share", 0.6), "smallest_share is not from 0 to 0.5");
   Json steep = {1.0, 0.0, 2.0};
   for (int slope = 0; slope <= llmt::most_leaf_slopes; ++slope) steep.insert(steep.end(), {0, 1.0});

@@ -188,8 +188,7 @@ TEST(SymmetricTable, IsOfCrispTreesWithOneSplitALevel) {
   EXPECT_FALSE(llmt::symmetric_table(other).has_value());
   other = tree;
   other.splits.back().missing_left = 0.25;
-  const std::vector<int> needed = llmt::symmetric_table(other)->needed;
-  EXPECT_EQ(std::ranges::count(needed, other.splits.back().feature), 1);
+  EXPECT_EQ(std::ranges::count(llmt::symmetric_table(other)->needed, other.splits.back().feature), 1);
   other = tree;
   other.leaves.back().features = {1, 0, 2};
   EXPECT_FALSE(llmt::symmetric_table(other).has_value());

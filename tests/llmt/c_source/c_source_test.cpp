@@ -111,11 +111,13 @@ TEST_F(CSource, FittedModelsWithProductsAndCodesGiveTheBytesOfTheLibrary) {
     at.col(2) = x.col(2).array() + 4.9;
     expect_equal(model, at, "fitted");
   }
-  for (Eigen::Index i = 0; i < 600; i += 9) {
-    x(i, 2) = missing;
-    y(i, 0) += 5.0;
+  // Codes, and rows without one.
+  for (Eigen::Index i = 0; i < 600; ++i) {
+    x(i, 2) = i % 9 == 8 ? missing : static_cast<double>(i % 9 + 1);
+    y(i, 0) += static_cast<double>(i % 9 * 5 % 9);
   }
   const llmt::Model model = llmt::fit(x, y).model;
+  EXPECT_FALSE(model.inputs()[2].codes.empty());
   EXPECT_TRUE(model.inputs()[2].has_empty_level());
   expect_equal(model, x, "a missing code");
 }

@@ -128,28 +128,29 @@ TEST(EmptyLevel, IsExplained) {
   EXPECT_GT(of_row.contributions(0, 0), 3.0);
 }
 
-// Months as numbers, without an order in their effect; a seventh of the rows has none.
+// Sides as numbers, without an order in their effect; a ninth of the rows has none.
 TEST(EmptyLevel, FollowsCodes) {
-  llmt::Random random(2);
+  llmt::Random random(1);
   llmt::TrainingData data;
-  data.inputs.resize(420, 2);
-  data.outputs.resize(420, 1);
-  const std::vector<double> of_month = {0.0, 3.0, -2.0, 1.0, -3.0, 2.0, 8.0};
-  for (Eigen::Index i = 0; i < 420; ++i) {
-    data.inputs(i, 0) = i % 7 == 6 ? missing : static_cast<double>(i % 7 + 1);
-    data.inputs(i, 1) = random.uniform();
-    data.outputs(i, 0) = of_month[i % 7] + data.inputs(i, 1) + 0.1 * random.normal();
+  data.inputs.resize(360, 3);
+  data.outputs.resize(360, 1);
+  const std::vector<double> of_side = {0.0, 2.0, -1.5, 1.0, -2.0, 1.5, -0.5, 0.8, 4.0};
+  const auto rest = [](double a, double b) { return 2.0 * std::sin(2.0 * a) + b * b; };
+  for (Eigen::Index i = 0; i < 360; ++i) {
+    data.inputs.row(i) << (i % 9 == 8 ? missing : static_cast<double>(i % 9 + 1)), random.uniform(-1.0, 1.0),
+        random.uniform(-1.0, 1.0);
+    data.outputs(i, 0) = of_side[i % 9] + rest(data.inputs(i, 1), data.inputs(i, 2)) + 0.2 * random.normal();
   }
   const llmt::FitResult result = llmt::fit(data);
   ASSERT_EQ(result.summary.codes.taken, std::vector<int>{0});
-  EXPECT_EQ(result.model.inputs()[0].codes.size(), 6U);
+  EXPECT_EQ(result.model.inputs()[0].codes.size(), 8U);
   EXPECT_TRUE(result.model.inputs()[0].has_empty_level());
-  EXPECT_EQ(result.summary.missing_values, 60);
+  EXPECT_EQ(result.summary.missing_values, 40);
   const llmt::Model read = llmt::from_json(llmt::to_json(result.model));
-  Eigen::MatrixXd asked(7, 2);
-  for (Eigen::Index i = 0; i < 7; ++i) asked.row(i) << (i == 6 ? missing : static_cast<double>(i + 1)), 0.5;
+  Eigen::MatrixXd asked(9, 3);
+  for (Eigen::Index i = 0; i < 9; ++i) asked.row(i) << (i == 8 ? missing : static_cast<double>(i + 1)), 0.3, 0.2;
   const Eigen::VectorXd y = result.model.predict(asked).col(0);
-  for (Eigen::Index i = 0; i < 7; ++i) EXPECT_NEAR(y(i), of_month[i] + 0.5, 0.2) << i;
+  for (Eigen::Index i = 0; i < 9; ++i) EXPECT_NEAR(y(i), of_side[i] + rest(0.3, 0.2), 0.3) << i;
   EXPECT_EQ(read.predict(asked).col(0), y);
 }
 

@@ -88,6 +88,9 @@ std::optional<SymmetricTable> symmetric_table(const BoostedTree& tree) {
   table.leaves.resize(std::size_t{1} << table.levels.size());
   table.slopes.resize(table.leaves.size() * table.features.size());
   fill(table, tree, root, 0, 0);
+  std::ranges::sort(table.needed);
+  const auto repeated = std::ranges::unique(table.needed);
+  table.needed.erase(repeated.begin(), repeated.end());
   return table;
 }
 
