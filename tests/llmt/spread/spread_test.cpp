@@ -240,7 +240,8 @@ TEST(Quantiles, AreTheEndsOfIntervalsInOrder) {
   EXPECT_NEAR(levels[2], 0.5, 1e-15);
   const auto row = [](double value) { return Eigen::MatrixXd::Constant(1, 1, value); };
   // The second interval lies beyond the prediction, 3.
-  const auto found = llmt::quantiles_from({{row(1), row(9)}, {row(4), row(5)}, {row(2), row(6)}}, row(3), probabilities);
+  const std::vector<llmt::Bounds> bounds = {{row(1), row(9)}, {row(4), row(5)}, {row(2), row(6)}};
+  const auto found = llmt::quantiles_from(bounds, row(3), probabilities);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0], (Eigen::MatrixXd(1, 4) << 1, 3, 4, 6).finished());
   for (const std::vector<double>& bad : {std::vector<double>{0.0}, {1.0}, {0.5, 0.5}, {0.5, 0.4}, {oracle::missing}}) {
