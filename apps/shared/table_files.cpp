@@ -39,13 +39,6 @@ const std::string* first_missing(const std::vector<std::string>& names, const st
 
 }  // namespace
 
-Eigen::Index rows_at_once(std::size_t columns) {
-  constexpr std::size_t most_rows = 65536;
-  constexpr std::size_t most_cells = std::size_t{1} << 24;
-  return static_cast<Eigen::Index>(
-      std::clamp<std::size_t>(most_cells / std::max<std::size_t>(columns, 1), 1, most_rows));
-}
-
 RowsInOrder::RowsInOrder(std::vector<std::string> paths, NumberFormat format)
     : paths_(std::move(paths)), format_(format) {
   open();
@@ -77,7 +70,7 @@ void RowsInOrder::open() {
 
 std::optional<Eigen::MatrixXd> RowsInOrder::next_of_file() {
   if (table_) {
-    const Eigen::Index count = std::min(rows_at_once(columns_.size()), table_->rows() - row_);
+    const Eigen::Index count = std::min(arrow_rows_at_once(columns_.size()), table_->rows() - row_);
     if (count == 0) return std::nullopt;
     row_ += count;
     return table_->read(row_ - count, count, columns_);
@@ -135,8 +128,8 @@ Eigen::MatrixXd TableFiles::read(Eigen::Index first, Eigen::Index count, const s
     part(Eigen::all, places) = file.table.read(begin - file.first, end - begin, numbers);
     for (std::size_t k = 0; k < levels.size(); ++k) {
       if (levels[k].empty()) continue;
-      for (Eigen::Index row = begin; row < end; row += rows_at_once(1)) {
-        const Eigen::Index few = std::min(rows_at_once(1), end - row);
+      for (Eigen::Index row = begin; row < end; row += arrow_rows_at_once(1)) {
+        const Eigen::Index few = std::min(arrow_rows_at_once(1), end - row);
         part.col(static_cast<Eigen::Index>(k)).segment(row - begin, few) =
             category_values(file.table.texts(row - file.first, few, columns[k]), levels[k]);
       }
@@ -148,8 +141,8 @@ Eigen::MatrixXd TableFiles::read(Eigen::Index first, Eigen::Index count, const s
 std::vector<std::string> TableFiles::words_of(const std::string& column, std::size_t most) const {
   std::set<std::string> words;
   for (const File& file : files_) {
-    for (Eigen::Index first = 0; first < file.table.rows(); first += rows_at_once(1)) {
-      const Eigen::Index count = std::min(rows_at_once(1), file.table.rows() - first);
+    for (Eigen::Index first = 0; first < file.table.rows(); first += arrow_rows_at_once(1)) {
+      const Eigen::Index count = std::min(arrow_rows_at_once(1), file.table.rows() - first);
       for (std::string& word : file.table.texts(first, count, column)) {
         if (!word.empty()) words.insert(std::move(word));
       }

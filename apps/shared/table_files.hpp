@@ -20,9 +20,6 @@ struct NumberFormat {
   bool thousands = false;
 };
 
-/// Rows of so many columns that are read at a time: 65536, or fewer if that were more than 2^24 cells.
-Eigen::Index rows_at_once(std::size_t columns);
-
 /// The rows of CSV and Arrow files, all of numbers, from the first to the last. Errors name the file, and the line and
 /// column where there is one.
 class RowsInOrder {

@@ -38,6 +38,15 @@ TrainingData read_into_memory(const TableFiles& table, const LearningArguments& 
   data.inputs = rows.leftCols(inputs);
   data.outputs = rows.middleCols(inputs, std::ssize(arguments.targets));
   if (!arguments.weight.empty()) data.weights = rows.rightCols(1);
+  if (!arguments.groups.empty()) {
+    const std::vector<std::string> groups = {arguments.groups};
+    table.require_numbers(groups);
+    const Eigen::MatrixXd numbers = table.read(0, table.rows(), groups, {{}});
+    for (Eigen::Index row = 0; row < numbers.rows(); ++row) {
+      if (std::isnan(numbers(row, 0))) table.refuse(row, arguments.groups, "says the groups and is missing");
+    }
+    data.groups.assign(numbers.data(), numbers.data() + numbers.size());
+  }
   data.may_have_codes = arguments.may_have_codes;
   return data;
 }

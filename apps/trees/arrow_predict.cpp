@@ -85,7 +85,7 @@ void predict_files(const PredictArguments& arguments) {
     std::string text;
     for (const OutputColumn& output : model.outputs()) text += csv_field(output.name + "_pred", separator) + separator;
     sink(text + fmt::format("outside{0}outside_by{0}leverage\n", separator));
-    const Eigen::Index most = rows_at_once(model.inputs().size());
+    const Eigen::Index most = arrow_rows_at_once(model.inputs().size());
     for (Eigen::Index first = 0; first < table.rows(); first += most) {
       const Eigen::Index count = std::min(most, table.rows() - first);
       const Eigen::MatrixXd inputs = reader.read(first, count);

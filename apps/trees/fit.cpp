@@ -13,6 +13,7 @@
 #include "llmt/teach.hpp"
 #include "report/document/document_text.hpp"
 #include "report/fit/fit_summary.hpp"
+#include "report/fit/neighbours.hpp"
 #include "report/fit/of_fit.hpp"
 #include "report/fit/readable_summary.hpp"
 #include "report/fit/teaching_summary.hpp"
@@ -121,6 +122,20 @@ std::string write_fit_reports(const FitArguments& arguments, const LearningTable
   return report_on(data.inputs(kept, Eigen::all), data.outputs(kept, Eigen::all), of_kept);
 }
 
+// What blocks of consecutive rows as folds would say, where rows that follow each other are alike; else nothing.
+std::optional<std::string> words_of_neighbours(const LearningTable& table, const FitResult& result) {
+  const double correlation = report::neighbours_correlation(*table.data, table.options, result);
+  if (!report::are_alike(correlation, table.data->inputs.rows())) return std::nullopt;
+  FitOptions contiguous = table.options;
+  contiguous.folds.kind = FoldKind::contiguous;
+  contiguous.intervals = false;
+  ProgressBar bar("blocks of rows");
+  const FitResult other = fit(*table.data, contiguous, bar.callback());
+  bar.clear();
+  return report::neighbours_text(correlation, result.summary.partitions.front().chosen.rmse,
+                                 other.summary.partitions.front().chosen.rmse);
+}
+
 void fit_command(FitArguments arguments) {
   double loss = 0.0;
   if (!arguments.readable.empty()) {
@@ -144,11 +159,13 @@ void fit_command(FitArguments arguments) {
   }
   std::optional<ReadableResult> readable;
   if (!arguments.readable.empty()) readable = make_readable(arguments, fitting, loss);
+  const std::optional<std::string> neighbours = words_of_neighbours(table, result);
   const auto run_of = [&](const std::string& data, const std::string& output) {
     return report::FitRun{data, table.options, *table.data, table.lines, output};
   };
   const auto words_for = [&](const std::string& output) {
     report::Document words = report::fit_words(run_of(table_name(arguments.learning.data), output), result);
+    if (neighbours) words.notes.push_back(*neighbours);
     if (fitting.taught) words.sections.push_back(report::teaching_words(*fitting.taught));
     if (readable) words.sections.push_back(report::readable_words(result, *readable, loss));
     return words;

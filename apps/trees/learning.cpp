@@ -4,8 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "llmt/arrow.hpp"
@@ -73,6 +75,17 @@ void look_for_nothing_to_learn(const Csv& csv, const LearningArguments& argument
   }
 }
 
+// Says which words are taken for missing values. NA may be a country.
+void say_what_is_taken_as_missing(const std::vector<std::string>& names, const report::InputColumns& inputs) {
+  for (const report::MarkedCells& cells : inputs.marked) {
+    const bool is_alone = inputs.marked.size() == 1 && !inputs.has_other_marks;
+    warn(fmt::format("llmt: {} cell{} {} of {} {} taken as missing{}; --categorical {} takes {} for a word",
+                     cells.count, cells.count == 1 ? "" : "s", cells.text, names[cells.column],
+                     cells.count == 1 ? "is" : "are", is_alone ? "; other columns have none" : "", names[cells.column],
+                     cells.text));
+  }
+}
+
 // Says which columns are inputs although they look like names or numbers of the rows. Nothing is said of inputs that
 // were asked for.
 void look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
@@ -134,13 +147,22 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
     if (target == arguments.weight) {
       throw std::invalid_argument(fmt::format("column \"{}\" is a target and the weight", target));
     }
+    if (target == arguments.groups) {
+      throw std::invalid_argument(fmt::format("column \"{}\" is a target and says the groups", target));
+    }
   }
+  if (!arguments.groups.empty()) csv.index_of(arguments.groups);
+  const auto is_free = [&](const std::string& column) {
+    return !contains(arguments.targets, column) && !contains(arguments.ignored, column) && column != arguments.weight &&
+           column != arguments.groups;
+  };
   std::vector<std::string> inputs;
   for (const std::string& column : arguments.inputs.empty() ? csv.columns() : arguments.inputs) {
-    if (!contains(arguments.targets, column) && !contains(arguments.ignored, column) && column != arguments.weight) {
+    if (is_free(column)) {
       inputs.push_back(column);
     } else if (!arguments.inputs.empty()) {
-      throw std::invalid_argument(fmt::format("--inputs has \"{}\", which is a target, the weight or ignored", column));
+      throw std::invalid_argument(
+          fmt::format("--inputs has \"{}\", which is a target, the weight, the groups or ignored", column));
     }
   }
   if (inputs.empty()) throw std::invalid_argument("no column is left to learn from");
@@ -157,6 +179,22 @@ std::vector<std::string> choose_inputs(const std::vector<std::string>& columns, 
 }
 
 namespace {
+
+// A number for each row, the same for equal words in the column.
+std::vector<double> group_numbers(const Csv& csv, const std::string& column) {
+  if (column.empty()) return {};
+  const std::vector<std::string> words = csv.texts(column);
+  std::map<std::string_view, double> seen;
+  std::vector<double> numbers;
+  for (std::size_t row = 0; row < words.size(); ++row) {
+    if (words[row].empty()) {
+      throw std::runtime_error(fmt::format("{}: line {}: column \"{}\" says the groups of --groups and is empty",
+                                           csv.name(), csv.line_of(static_cast<Eigen::Index>(row)), column));
+    }
+    numbers.push_back(seen.try_emplace(words[row], static_cast<double>(seen.size())).first->second);
+  }
+  return numbers;
+}
 
 std::vector<Eigen::Index> lines_of_rows(const Csv& csv) {
   std::vector<Eigen::Index> rows(csv.rows());
@@ -182,12 +220,14 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
                                     largest_input, arguments.options.max_threads);
   look_for_dominant_rows(csv, arguments, columns);
   look_for_accidental_inputs(arguments, inputs, columns.inputs);
+  say_what_is_taken_as_missing(inputs, columns.inputs);
   look_for_nothing_to_learn(csv, arguments, columns);
   LearningTable table{nullptr, arguments.options, lines_of_rows(csv)};
   FitOptions& options = table.options;
   set_columns(arguments.columns, inputs, columns.inputs.levels, options);
   TrainingData data{.inputs = std::move(columns.inputs.values), .outputs = std::move(columns.targets)};
   data.weights = std::move(columns.weights);
+  data.groups = group_numbers(csv, arguments.groups);
   data.levels = std::move(columns.inputs.levels);
   data.may_have_codes = arguments.may_have_codes;
   data.input_names = inputs;
@@ -202,8 +242,13 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   add_names(command, "--inputs", arguments.inputs, "COLUMN", "What to learn from [all but targets and ignored]");
   add_names(command, "--ignore", arguments.ignored, "COLUMN", "What to leave out");
   add_names(command, "--categorical", arguments.categorical, "COLUMN",
-            "Inputs that are categories although they are written as numbers; columns of words are anyway");
+            "Inputs that are categories although they are written as numbers; columns of words are anyway. In a named "
+            "column NA, null and the like are words, and only an empty cell is missing");
   command.add_option("--weight", arguments.weight, "The weights of the rows [1 for each]")->type_name("COLUMN");
+  command
+      .add_option("--groups", arguments.groups,
+                  "What rows belong to, such as a machine or a day: rows of one group are held out together")
+      ->type_name("COLUMN");
   add_decimal_comma(command, arguments.mark);
   add_thousands(command, arguments.thousands);
   command

@@ -21,6 +21,7 @@ struct LearningArguments {
   std::vector<std::string> ignored;
   std::vector<std::string> categorical;
   std::string weight;
+  std::string groups;
   bool may_have_codes = true;  ///< see TrainingData
   DecimalMark mark = DecimalMark::point;
   bool thousands = false;
@@ -34,7 +35,8 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments);
 /// Throws std::invalid_argument that lists the columns of the table if no target is named, and as read_table().
 void require_target(const LearningArguments& arguments);
 
-/// The columns to learn from: those asked for, or all but the targets, the weight and what is ignored. Throws as
+/// The columns to learn from: those asked for, or all but the targets, the weight, the groups and what is
+/// ignored. Throws as
 /// read_learning_table().
 std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments);
 

@@ -103,6 +103,7 @@ report::Prediction predict_table(const PredictArguments& arguments, const Booste
   predicted.has_leverage = false;
   for (const double distance : distance_outside(model, inputs.values)) predicted.extrapolation.push_back({distance});
   add_asked_intervals(arguments, model, inputs.values, predicted);
+  if (predicted.bounds) predicted.bounds->uncalibrated = incomplete_rows(model, inputs.values);
   add_errors(arguments, csv, predicted);
   return predicted;
 }

@@ -30,7 +30,7 @@ using limits::times;
 using llmt::Limit;
 using program::Folder;
 
-// A file of so many bytes that takes no room on the disk.
+// A file of this number of bytes that takes no room on the disk.
 std::string sparse(const Folder& folder, std::int64_t bytes) {
   const std::string path = folder.write("sparse", "");
   std::filesystem::resize_file(path, bytes);
@@ -85,7 +85,7 @@ void write_through_links(const Folder& folder, std::int64_t links) {
   llmt::write_file(folder.file(fmt::format("link{}", links)), "content");
 }
 
-// A message of so many bytes, without its line break.
+// A message of this number of bytes, without its line break.
 void say(const Folder& folder, std::int64_t bytes) {
   folder.write("t.csv", "a,b\n1,2\n");
   const auto message = [&](std::int64_t letters) {

@@ -18,13 +18,21 @@ inline double tree_at(const llmt::BoostedTree& tree, const std::vector<double>& 
     const llmt::BoostedLeaf& leaf = tree.leaves[-1 - at];
     double value = leaf.constant;
     for (std::size_t k = 0; k < leaf.features.size(); ++k) {
-      if (!std::isnan(z[leaf.features[k]])) value += leaf.slopes[k] * z[leaf.features[k]];
+      const double stand_in = leaf.means.empty() ? 0.0 : leaf.means[k];
+      value += leaf.slopes[k] * (std::isnan(z[leaf.features[k]]) ? stand_in : z[leaf.features[k]]);
     }
     return share * std::min(std::max(value, leaf.low), leaf.high);
   }
   const llmt::BoostedSplit& split = tree.splits[at];
   const double value = z[split.feature];
-  if (std::isnan(value)) return tree_at(tree, z, split.missing_left ? split.left : split.right, share, blends);
+  if (std::isnan(value)) {
+    double sum = 0.0;
+    for (const bool is_left : {true, false}) {
+      const double of_side = is_left ? split.missing_left : 1.0 - split.missing_left;
+      if (of_side > 0.0) sum += tree_at(tree, z, is_left ? split.left : split.right, share * of_side, blends);
+    }
+    return sum;
+  }
   const double u = (value - split.threshold) / split.half_width;
   const double right = 0.5 + u * (3.0 - u * u) / 4.0;
   if (std::abs(value - split.threshold) < split.half_width && share * right >= tree.smallest_share &&
@@ -45,8 +53,10 @@ inline double sum_at(const llmt::BoostedModel& model, Eigen::Index output, const
   std::vector<double> z;
   for (const llmt::BoostedFeature& feature : sum.features) {
     const auto of = [&](int input) { return (x(input) - model.inputs()[input].centre) / model.deviations()[input]; };
-    const double level = x(feature.first);
-    const auto levels = static_cast<double>(model.inputs()[feature.first].levels.size());
+    const std::vector<std::string>& names = model.inputs()[feature.first].levels;
+    const auto levels = static_cast<double>(names.size());
+    const bool is_empty_level = std::isnan(x(feature.first)) && !names.empty() && names.back().empty();
+    const double level = is_empty_level ? levels - 1.0 : x(feature.first);
     const double is_level = level < levels ? level == feature.level : std::numeric_limits<double>::quiet_NaN();
     z.push_back(feature.level >= 0    ? is_level
                 : feature.second >= 0 ? of(feature.first) + feature.sign * of(feature.second)

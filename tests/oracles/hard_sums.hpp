@@ -37,7 +37,7 @@ inline llmt::BoostedModel chain_of_sum(const ChainOfSum& chain) {
     tree.splits.push_back({.feature = k % chain.inputs,
                            .threshold = 0.1 * (k % 5 - 2),
                            .half_width = chain.half_width,
-                           .missing_left = k % 3 == 0,
+                           .missing_left = k % 3 == 0 ? 1.0 : 0.0,
                            .left = chain.to_the_left ? next : -1 - k,
                            .right = chain.to_the_left ? -1 - k : next});
   }

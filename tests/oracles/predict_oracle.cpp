@@ -9,9 +9,16 @@ namespace {
 
 bool is_number_split(const llmt::Node& node) { return node.level_side.empty(); }
 
+// The value of an input, where it is missing that of the level for it, if there is one.
+double value_of(const llmt::Model& model, int input, const Eigen::VectorXd& row) {
+  const std::vector<std::string>& levels = model.inputs()[input].levels;
+  const bool is_level = std::isnan(row(input)) && !levels.empty() && levels.back().empty();
+  return is_level ? static_cast<double>(levels.size()) - 1.0 : row(input);
+}
+
 // What a split compares.
 double side(const llmt::Model& model, const llmt::Node& node, const Eigen::VectorXd& row) {
-  if (node.direction.size() == 0) return row(node.split_input);
+  if (node.direction.size() == 0) return value_of(model, node.split_input, row);
   double sum = 0.0;
   for (Eigen::Index j = 0; j < row.size(); ++j) {
     const double centre = model.inputs()[j].centre;
@@ -122,7 +129,7 @@ Eigen::VectorXd deviations(const llmt::Model& model, const Eigen::VectorXd& row)
   Eigen::VectorXd result(std::ssize(model.regressors()));
   for (std::size_t k = 0; k < model.regressors().size(); ++k) {
     const llmt::Regressor& regressor = model.regressors()[k];
-    const double x = row(regressor.input);
+    const double x = value_of(model, regressor.input, row);
     double& deviation = result(k);
     if (regressor.second_input >= 0) {
       deviation = factor(regressor.input) * factor(regressor.second_input) - regressor.centre;

@@ -1,6 +1,7 @@
 // Sums of random trees: all that a fit can make of them, and more.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -35,7 +36,7 @@ inline llmt::BoostedTree random_tree(const Kind& kind, int features, llmt::Rando
     tree.splits.push_back({.feature = pick(features),
                            .threshold = random.uniform(-1.0, 1.0),
                            .half_width = kind.soft && random.uniform() < 0.5 ? random.uniform(0.1, 1.5) : 0.0,
-                           .missing_left = random.uniform() < 0.5});
+                           .missing_left = std::clamp(random.uniform(-1.0, 2.0), 0.0, 1.0)});
     open.push_back(&tree.splits.back().left);
     open.push_back(&tree.splits.back().right);
   }
@@ -48,6 +49,7 @@ inline llmt::BoostedTree random_tree(const Kind& kind, int features, llmt::Rando
       leaf.features.push_back(feature);
       leaf.slopes.push_back(random.normal());
     }
+    for (std::size_t j = 0; k % 2 == 0 && j < leaf.slopes.size(); ++j) leaf.means.push_back(random.uniform(-1.0, 1.0));
     tree.leaves.push_back(leaf);
   }
   return tree;
@@ -67,7 +69,7 @@ inline llmt::BoostedModel model(const Kind& kind, std::uint64_t seed) {
     features.push_back({.first = j});
   }
   llmt::InputColumn colour{.name = "colour", .low = 0.0, .high = 2.0};
-  colour.levels = {"blue", "green", "red"};
+  colour.levels = {"blue", "green", seed % 2 == 0 ? "" : "red"};  // the last one may be that of missing values
   inputs.push_back(colour);
   deviations.push_back(1.0);
   for (int level = 0; level < 3; ++level) features.push_back({.first = 4, .level = level});

@@ -151,8 +151,8 @@ inline llmt::Model random_model(const Kind& kind, std::uint64_t seed) {
       regressors.push_back({.input = j, .level = -1, .centre = 0.1 * random.normal()});
       continue;
     }
-    inputs.back().levels = {"a", "b", "c", "d"};
-    for (const int level : {0, 2}) {
+    inputs.back().levels = {"a", "b", "c", seed % 2 == 0 ? "" : "d"};  // the last one may be that of missing values
+    for (const int level : seed % 2 == 0 ? std::vector{0, 3} : std::vector{0, 2}) {
       regressors.push_back({.input = j, .level = level, .centre = 0.25});
     }
   }

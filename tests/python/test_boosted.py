@@ -179,7 +179,6 @@ def test_partial_dependence_is_a_mean_of_predictions():
         (lambda X, y: quick(learning_rate=0.0).fit(X, y), "learning_rate is 0.0"),
         (lambda X, y: BoostedLocalLinearTreeRegressor(max_iter=0).fit(X, y), "max_iter is 0"),
         (lambda X, y: quick(n_jobs=-3).fit(X, y), "n_jobs is -3"),
-        (lambda X, y: quick(categorical_features=[0]).fit(np.arange(80.0).reshape(-1, 1), y[:80]), "at most 50"),
         (lambda X, y: quick().fit(X, y).predict(X[:, :3]), "BoostedLocalLinearTreeRegressor is expecting 4 features"),
         (lambda X, y: quick().fit(X, y).to_onnx(), r"a sum of \d+ trees with \d+ leaves .* to_c\(\) writes it"),
         (lambda X, y: quick().fit(X, y).to_sql(), r"to_sql\(\): a sum of"),

@@ -27,7 +27,7 @@ def test_nothing_given_is_changed():
     read = read_table(values, categorical=[0])
     assert read.levels == [["1", "2"], []]
     np.testing.assert_array_equal(read.values, [[1, 7], [0, 5]])
-    np.testing.assert_array_equal(read_table(values, levels=[["2"], []]).values, [[0, 7], [np.nan, 5]])
+    np.testing.assert_array_equal(read_table(values, levels=[["2"], []]).values, [[0, 7], [-1, 5]])
     np.testing.assert_array_equal(values, [[2, 7], [1, 5]])
     assert read_table(frame, categorical="a").levels == [["1", "2"]]
     assert frame["a"].tolist() == [2.0, 1.0]
@@ -76,9 +76,9 @@ def test_a_column_without_values_is_numbers_unless_it_is_declared():
 
 def test_levels_that_are_given():
     levels = [[], ["10", "8", "9.0"], ["b", "c"]]
-    read = read_table(FRAME.assign(w=["c", "?", "d"]), levels=levels)
+    read = read_table(FRAME.assign(w=["c", "", "d"]), levels=levels)
     assert (read.levels, read.unknown) == (levels, [0, 0, 1])
-    np.testing.assert_array_equal(read.values, [[1, 0, 1], [2.5, 2, np.nan], [np.nan, 0, np.nan]])
+    np.testing.assert_array_equal(read.values, [[1, 0, 1], [2.5, 2, np.nan], [np.nan, 0, -1]])
     other_codes = FRAME.assign(w=pd.Categorical(["c", "b", "b"], categories=["c", "b"]))
     np.testing.assert_array_equal(read_table(other_codes, levels=levels).values[:, 2], [1, 0, 0])
     as_text = read_table(FRAME.astype({"k": str}), levels=[[], ["10", "9"], ["b"]])
@@ -118,12 +118,14 @@ def test_outer_blanks_are_no_part_of_a_word(blanks):
 
 
 def test_words_that_stand_for_no_value():
-    missing = ["", " ", "NA", "na", "N/A", "n/a", "NaN", "nan", "NAN", "null", "NULL", "Null", " null\t", "?", "\r?"]
-    words = ["none", "nul", "nulls", "n.a.", "??", "-", "nan1", "na n", "N/A/"]
+    missing = ["", " ", "\t\r"]
+    words = ["NA", "na", "N/A", "n/a", "NaN", "nan", "null", "NULL", "?", "none", "n.a.", "-"]
     read = read_table(pd.DataFrame({"w": missing + words}))
     assert read.levels == [sorted(words)]
     assert np.isnan(read.values[: len(missing), 0]).all() and not np.isnan(read.values[len(missing) :, 0]).any()
-    assert read_table(pd.DataFrame({"w": missing + words}), levels=[["none"]]).unknown == [len(words) - 1]
+    given = read_table(pd.DataFrame({"w": missing + words}), levels=[["none"]])
+    assert given.unknown == [len(words) - 1]
+    assert np.isnan(given.values[: len(missing), 0]).all() and set(given.values[len(missing) :, 0]) == {-1.0, 0.0}
 
 
 def test_ten_thousand_categories_are_taken():

@@ -44,7 +44,7 @@ def _numpy() -> None:
         TYPES[f"numpy {name}"] = (lambda t=name: np.array([[1.0], [0.0], [-2.0]], dtype=t), [1.0, 0.0, -2.0])
     for name, cells, expected in (
         ("numbers", [1, 2.5, None, Decimal("0.1"), True, np.int8(4)], [1.0, 2.5, None, 0.1, 1.0, 4.0]),
-        ("words", ["b", None, float("nan"), " a ", "", "n/a", "?"], ["b", None, None, "a", None, None, None]),
+        ("words", ["b", None, float("nan"), " a ", "", "n/a", "?"], ["b", None, None, "a", None, "n/a", "?"]),
         ("a mix", [1, "a"], "mixes words and numbers"),
         ("dates", [DAY, None], "holds dates"),
         ("datetimes", [NOON, None], "holds dates"),

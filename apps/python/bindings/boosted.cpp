@@ -57,9 +57,10 @@ auto intervals_of_sum(const BoostedModel& self, const Array& inputs, double leve
     const Bounds part = self.intervals(block, level, threads);
     bounds.lower.middleRows(first, block.rows()) = part.lower;
     bounds.upper.middleRows(first, block.rows()) = part.upper;
+    for (const Eigen::Index row : incomplete_rows(self, block)) bounds.uncalibrated.push_back(first + row);
   });
   return std::make_tuple(array_of<double>(std::move(bounds.lower)), array_of<double>(std::move(bounds.upper)),
-                         bounds.uncalibrated);
+                         std::move(bounds.uncalibrated));
 }
 
 auto quantiles_of_sum(const BoostedModel& self, const Array& inputs, const std::vector<double>& probabilities,

@@ -11,6 +11,7 @@ from . import _core
 from ._model import BoostedModel
 from ._progress import Bar
 from ._regressor import FitRows, TableRegressor, count, spread
+from ._tree import level_names
 from ._views import Views
 
 if TYPE_CHECKING:
@@ -24,9 +25,9 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
     and how many there are is decided by the error on rows that are held out; then the sum is fitted to all rows
     (docs/algorithms/boosting.md). A sum is fitted to each target.
 
-    Inputs are those of `LocalLinearTreeRegressor`: numbers, words (categories by themselves, of at most 50 levels) and
-    missing cells, in arrays and frames. What a sum has not: rules and equations, monotone inputs, a robust loss, learning
-    from a stream, ONNX and SQL. `LocalLinearTreeRegressor` has them.
+    Inputs are those of `LocalLinearTreeRegressor`: numbers, words (categories by themselves; the rarest beyond 255 are
+    not told from each other) and missing cells, in arrays and frames. What a sum has not: rules and equations, monotone
+    inputs, a robust loss, learning from a stream, ONNX and SQL. `LocalLinearTreeRegressor` has them.
 
     Parameters
     ----------
@@ -169,7 +170,7 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
         handle = self._model().handle
         position = self._column(name)
         column = handle.inputs()[position]
-        levels = list(column["levels"])
+        levels = level_names(column)
         if at is None:
             at = levels or np.linspace(column["low"], column["high"], 50)
         if unknown := [label for label in at if levels and label not in levels]:

@@ -88,7 +88,7 @@ def _look_at(column: dict[str, Any], values: np.ndarray, training: np.ndarray, u
         "below": int((present < column["low"]).sum()) if is_number else 0,
         "above": int((present > column["high"]).sum()) if is_number else 0,
         "unknown": int(unknown),
-        "missing": int(np.isnan(values).sum()) - int(unknown),
+        "missing": int(np.isnan(values).sum()),
         "mean": float(present.mean()) if is_number and len(present) else np.nan,
         "training_mean": float(column["centre"]),
         "shift": 0.0,

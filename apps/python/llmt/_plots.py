@@ -13,6 +13,7 @@ from ._facts import facts_of
 from ._frames import curves
 from ._layout import MOST_LEAVES, layout_of
 from ._tree import Tree, level_names, number, shown, trees
+from .tables import UNKNOWN
 
 _BLUE, _ORANGE, _GREY = "#2f86d1", "#d2603a", "#8c8c8c"
 _WIDTH = 9.0  # inches
@@ -113,7 +114,7 @@ def plot_curve(
     names = [column["name"] for column in columns]
     if name not in names:
         raise ValueError(f"there is no input {name!r}; there are {', '.join(names)}")
-    point = np.array([math.nan if level_names(column) else column["centre"] for column in columns])
+    point = np.array([_no_category(column) if level_names(column) else column["centre"] for column in columns])
     common = {} if sample is None or len(sample) < 2 else _commonest(
         columns, np.asarray(sample), {name, *(at or {})} | {of for of, is_used in zip(names, handle.used_inputs()) if not is_used}
     )
@@ -126,7 +127,7 @@ def plot_curve(
     position = names.index(name)
     levels = level_names(columns[position])
     codes = columns[position]["codes"]
-    xs = np.array(codes, dtype=float) if len(codes) else np.arange(len(levels), dtype=float)
+    xs = np.array([*codes, math.nan][: len(levels)]) if len(codes) else np.arange(len(levels), dtype=float)
     if not levels:
         xs = np.linspace(columns[position]["low"], columns[position]["high"], places)
     rows = np.tile(point, (len(xs), 1))
@@ -320,6 +321,12 @@ def plot_all(
     figure.draw_without_rendering()  # the tree's letters follow the size of its axes
     plot_tree(model, summary, above, target, 16, readable)
     return [above, *below]
+
+
+def _no_category(column: Mapping[str, Any]) -> float:
+    """What stands for no category: a missing value, or, where that is a level, a position that is none."""
+    has_empty_level = not len(column["codes"]) and column["levels"][-1] == ""
+    return UNKNOWN if has_empty_level else math.nan
 
 
 def _label(ax: Any, x: str, y: str) -> None:

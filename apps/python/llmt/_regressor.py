@@ -12,7 +12,7 @@ import numpy as np
 from . import _advice, _core
 from ._base import BaseEstimator, NotFittedError, RegressorMixin
 from ._model import TextModel
-from .tables import Table, read_column, read_table, read_targets, row_labels
+from .tables import UNKNOWN, Table, read_column, read_table, read_targets, row_labels
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -94,13 +94,21 @@ class TableRegressor(RegressorMixin, BaseEstimator):
         Warns
         -----
         UserWarning
-            Of rows outside of the training ranges, for which no interval is honest. `check` says where they are.
+            Of rows outside of the training ranges, for which no interval is honest, and of rows with a missing cell or
+            a category as too few training rows had, or none. `check` says where they are.
         """
         level = share("coverage", coverage)
         handle = self._handle_with_intervals("predict_interval")
         values = self._table(X).values
-        lower, upper, _ = handle.intervals(values, level, self._threads())
+        lower, upper, uncalibrated = handle.intervals(values, level, self._threads())
         self._warn_of_rows_outside(values)
+        if len(uncalibrated):
+            warnings.warn(
+                f"{len(uncalibrated)} of {len(values)} rows have a missing cell or an unknown category, as too few training "
+                f"rows had, the first is row {uncalibrated[0]}: their intervals are likely too narrow; check(X) names the "
+                "columns",
+                stacklevel=2,
+            )
         ends = np.stack([lower, upper], axis=1)
         return ends[:, :, 0] if self._is_flat else ends
 
@@ -259,6 +267,7 @@ class TableRegressor(RegressorMixin, BaseEstimator):
             raise ValueError("eval_set must be a pair (X, y)")
         X, y = given
         rows = read_table(X, levels=table.levels, fitted_names=table.names, name="eval_set[0]").values
+        rows = np.where((rows == UNKNOWN) & [bool(of) for of in table.levels], np.nan, rows)
         judged, _ = read_targets(y)
         check_rows(len(rows), len(judged))
         judged = judged.reshape(len(judged), -1)

@@ -239,10 +239,17 @@ def _handle_of(model: dict[str, Any]) -> _core.Model:
     return _core.Model(json.dumps(model))
 
 
+EMPTY = "(empty)"
+"""What the level of missing values is called."""
+
+
 def level_names(of: dict[str, Any]) -> list[str]:
     """The names of the levels of an input; empty for numbers."""
-    codes = of.get("codes") or []
-    return [repr(float(code)).removesuffix(".0") for code in codes] if len(codes) else list(of.get("levels") or [])
+    codes = of.get("codes")
+    if codes is None or not len(codes):
+        return [name or EMPTY for name in of.get("levels") or []]
+    has_empty_level = "empty_level" in of or len(of.get("levels") or []) > len(codes)
+    return [repr(float(code)).removesuffix(".0") for code in codes] + ([EMPTY] if has_empty_level else [])
 
 
 def _is_short(value: float, beside: float = 0.0) -> bool:

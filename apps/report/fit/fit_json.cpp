@@ -22,6 +22,17 @@ Json candidate_json(const CandidateError& entry) {
           {"spread", finite_or_null(entry.spread)}};
 }
 
+Json equal_rows_json(const std::optional<EqualRowErrors>& errors) {
+  if (!errors) return nullptr;
+  Json json = {{"rows_new", errors->rows_new},
+               {"rows_known", errors->rows_known},
+               {"cv_rmse_new", Json::array()},
+               {"cv_rmse_known", Json::array()}};
+  for (const double rmse : errors->rmse_new) json["cv_rmse_new"].push_back(finite_or_null(rmse));
+  for (const double rmse : errors->rmse_known) json["cv_rmse_known"].push_back(finite_or_null(rmse));
+  return json;
+}
+
 double least_squares_rmse(const PartitionSummary& partition) {
   return partition.best_of_kind.empty() ? std::nan("") : partition.best_of_kind.front().rmse;
 }
@@ -83,6 +94,7 @@ Json fit_json(const FitRun& run, const FitResult& result) {
       entry["compared"].push_back(candidate_json(other));
     }
     entry["cv_rmse"] = judged ? Json(partition.chosen.rmse) : Json(nullptr);
+    entry["equal_rows"] = equal_rows_json(partition.equal_rows);
     entry["range_guards"] = Json::array();  // one a target
     for (const RangeGuard& guard : partition.range_guards) {
       entry["range_guards"].push_back(

@@ -49,14 +49,16 @@ Chart slice(const Fitted& fitted, Eigen::Index output, int input) {
   for (int k = 0; k < places && column.is_categorical(); ++k) xs.push_back(k);
   for (int k = 0; k < places; ++k) queries(k, input) = xs[k];
   if (!column.codes.empty()) {
-    for (int k = 0; k < places; ++k) queries(k, input) = column.codes[k];
+    for (std::size_t k = 0; k < column.codes.size(); ++k)
+      queries(static_cast<Eigen::Index>(k), input) = column.codes[k];
   }
+  if (column.has_empty_level()) queries(places - 1, input) = std::nan("");
   Chart chart{.title = fmt::format("Along {}", column.name),
               .x = {column.name},
               .y = {model.outputs()[output].name},
               .layers = {}};
   if (column.is_categorical()) {
-    chart.x.categories = column.levels;
+    for (std::size_t k = 0; k < column.levels.size(); ++k) chart.x.categories.push_back(column.shown_level(k));
     chart.layers.push_back(
         {.mark = Mark::bars, .role = "model", .x = xs, .y = numbers_of(model.predict(queries).col(output))});
     return chart;
@@ -118,7 +120,7 @@ Chart waterfall(const Fitted& fitted, Eigen::Index output) {
     const double value = fitted.inputs(row, j);
     const std::string text = std::isnan(value) ? "missing"
                              : column.is_categorical() && column.codes.empty()
-                                 ? column.levels[static_cast<std::size_t>(value)]
+                                 ? column.shown_level(static_cast<std::size_t>(value))
                                  : number(value);
     add(fmt::format("{} = {}", column.name, text), parts(j));
   }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "report/fit/kinds.hpp"
@@ -26,8 +28,9 @@ std::string selection_text(const FitRun& run, const PartitionSummary& partition)
   if (partition.cv_folds == 1) {
     return fmt::format("chosen on {} rows held out once", partition.held_out_rows);
   }
-  return fmt::format("chosen by {}-fold cross-validation{}, the tree grown anew in every fold", partition.cv_folds,
-                     run.options.folds.kind == FoldKind::contiguous ? " over contiguous blocks of rows" : "");
+  return fmt::format("chosen by {}-fold cross-validation{}{}, the tree grown anew in every fold", partition.cv_folds,
+                     run.options.folds.kind == FoldKind::contiguous ? " over contiguous blocks of rows" : "",
+                     run.rows.groups.empty() ? "" : " that keeps groups together");
 }
 
 // What the local models are made of, and what spoke for it; nothing for what was not asked.
@@ -108,6 +111,46 @@ void add_search(const SearchSummary& search, Lines& lines) {
           : "No threshold within a group is better."));
 }
 
+// What rows with equal inputs say of the held-out error; nothing if there are hardly any.
+void add_equal_rows(const FitResult& result, Lines& notes) {
+  constexpr Eigen::Index fewest = 10;  // fewer rows say nothing of an error
+  for (const PartitionSummary& partition : result.summary.partitions) {
+    if (!partition.equal_rows) continue;
+    const EqualRowErrors& errors = *partition.equal_rows;
+    const bool repeats = result.summary.repeats;
+    if (!repeats && std::min(errors.rows_new, errors.rows_known) < fewest) continue;
+    for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
+      const auto at = static_cast<Eigen::Index>(o);
+      const std::string of_target = result.model.num_outputs() == 1
+                                        ? ""
+                                        : fmt::format(" of {}", result.model.outputs()[partition.outputs[o]].name);
+      notes.push_back(
+          repeats
+              ? fmt::format("Rows with equal inputs are taken for repeats of one setting and held out together: RMSE "
+                            "held-out{} {} is for new settings; repeats of a setting differ by {}",
+                            of_target, number(errors.rmse_new(at)), number(errors.rmse_known(at)))
+              : fmt::format("RMSE held-out{}: {} for the {} rows with inputs that no training row has, {} for the "
+                            "other {}",
+                            of_target, number(errors.rmse_new(at)), errors.rows_new, number(errors.rmse_known(at)),
+                            errors.rows_known));
+    }
+  }
+}
+
+// " (country 139, age 2)": the inputs with missing values, those with most of them first.
+std::string columns_with_missing(const FitRun& run, const Model& model) {
+  std::vector<std::pair<Eigen::Index, std::string>> columns;
+  for (Eigen::Index j = 0; j < run.rows.inputs.cols(); ++j) {
+    const Eigen::Index count = run.rows.inputs.col(j).array().isNaN().count();
+    if (count > 0) columns.emplace_back(-count, fmt::format("{} {}", model.inputs()[j].name, count));
+  }
+  if (columns.empty()) return "";
+  std::ranges::stable_sort(columns, {}, &std::pair<Eigen::Index, std::string>::first);
+  std::vector<std::string> names;
+  for (auto& [count, name] : columns) names.push_back(std::move(name));
+  return fmt::format(" ({})", first_names(names));
+}
+
 // What was read, and what is to be known of its rows.
 void add_data(const FitRun& run, const FitResult& result, Document& words) {
   std::vector<std::string> inputs;
@@ -121,15 +164,14 @@ void add_data(const FitRun& run, const FitResult& result, Document& words) {
   }
   words.subject = fmt::format("{}: {} rows, {} input{}: {}", run.data, result.summary.samples, inputs.size(),
                               inputs.size() == 1 ? "" : "s", first_names(inputs));
-  if (result.summary.repeats) {
-    words.notes.push_back("Rows with equal inputs are taken for repeats of one measurement, and are held out together");
-  }
+  add_equal_rows(result, words.notes);
   if (result.summary.copies > 0) {
     words.notes.push_back(fmt::format(
         "Copies of other rows: {}; they only add to the weight of the rows that they copy", result.summary.copies));
   }
   if (result.summary.missing_values > 0) {
-    words.notes.push_back(fmt::format("Missing values in the inputs: {}", result.summary.missing_values));
+    words.notes.push_back(fmt::format("Missing values in the inputs: {}{}", result.summary.missing_values,
+                                      columns_with_missing(run, result.model)));
   }
   if (run.options.loss == Loss::tukey) {
     const std::vector<Eigen::Index> rows = rows_left_out(result.summary.loss_weights, run.rows.weights);

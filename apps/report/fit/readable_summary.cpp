@@ -92,6 +92,10 @@ Section readable_words(const FitResult& fitted, const ReadableResult& readable, 
     const CandidateError& linear = full.best_of_kind.front();
     const Model root = whole.prefix(1);
     add("", "least squares", 1, most_terms(root.partitions()[0]), expression_size(root), linear.rmse, linear.spread);
+    if (simple.rmse < full.chosen.rmse) {
+      notes.push_back(fmt::format("The readable tree{} has a smaller held-out error than the model chosen above.",
+                                  readable.partitions.size() > 1 ? " of " + target : ""));
+    }
     notes.push_back(note_on(simple, readable.partitions.size() > 1 ? " of " + target : "", loss));
   }
   return {"What reading costs", "", {block(table), text_block("", notes)}};

@@ -57,7 +57,9 @@ std::string boosted_inspection_text(const BoostedModel& model, const std::string
   Table inputs({"input", "low", "high", "mean"});
   for (const InputColumn& input : model.inputs()) {
     if (input.is_categorical()) {
-      inputs.add({input.name, fmt::format("{} levels: {}", input.levels.size(), first_names(input.levels)), "", ""});
+      std::vector<std::string> levels;
+      for (std::size_t k = 0; k < input.levels.size(); ++k) levels.push_back(input.shown_level(k));
+      inputs.add({input.name, fmt::format("{} levels: {}", levels.size(), first_names(levels)), "", ""});
     } else {
       inputs.add({input.name, number(input.low), number(input.high), number(input.centre)});
     }

@@ -23,7 +23,9 @@ std::vector<std::size_t> by_size(const Eigen::VectorXd& values) {
 // A value of an input: a number, a word, or null where it is missing.
 Json input_json(const InputColumn& input, double value) {
   if (std::isnan(value)) return nullptr;
-  if (input.is_categorical() && input.codes.empty()) return input.levels[static_cast<std::size_t>(value)];
+  if (input.is_categorical() && input.codes.empty()) {
+    return value >= 0.0 ? Json(input.shown_level(static_cast<std::size_t>(value))) : Json(nullptr);
+  }
   return value;
 }
 

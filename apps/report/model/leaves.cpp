@@ -83,7 +83,7 @@ std::string short_name(const Model& model, std::size_t k) {
     const InputColumn& second = model.inputs()[regressor.second_input];
     return regressor.second_input == regressor.input ? factor(input) + "^2" : factor(input) + "*" + factor(second);
   }
-  return regressor.level < 0 ? input.name : fmt::format("[{} = {}]", input.name, input.levels[regressor.level]);
+  return regressor.level < 0 ? input.name : fmt::format("[{} = {}]", input.name, input.shown_level(regressor.level));
 }
 
 // "1.5 + 2 x1 - 0.3 x2".

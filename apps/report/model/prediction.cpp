@@ -92,13 +92,18 @@ std::string prediction_text(const Prediction& prediction, const std::string& dat
   }
   if (prediction.missing > 0) text += fmt::format("; {} missing values", prediction.missing);
   if (prediction.unknown > 0) {
-    text += fmt::format("; {} values of categories that were not in training, taken as missing", prediction.unknown);
+    text += fmt::format("; {} value{} of categories that were not in training", prediction.unknown,
+                        prediction.unknown == 1 ? "" : "s");
   }
   if (prediction.unseen_codes > 0) {
     text += fmt::format("; {} codes that were not in training, taken as the nearest", prediction.unseen_codes);
   }
   if (const std::size_t count = count_uncalibrated(prediction); count > 0) {
-    text += fmt::format("; likely too narrow, because too few training rows had an empty cell: {} intervals", count);
+    text += fmt::format(
+        "; {} interval{} likely too narrow, because the row{} an empty cell or an unknown category, as too few "
+        "training "
+        "rows had",
+        count, count == 1 ? " is" : "s are", count == 1 ? " has" : "s have");
   }
   return text;
 }

@@ -83,7 +83,7 @@ std::string among(const InputColumn& input, const std::vector<int>& levels) {
 
 std::string quoted_levels(const InputColumn& input, const std::vector<int>& levels) {
   std::vector<std::string> names;
-  for (const int level : levels) names.push_back(csv_field(input.levels[level]));
+  for (const int level : levels) names.push_back(csv_field(input.shown_level(level)));
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
@@ -95,7 +95,7 @@ std::string regressor_name(const std::vector<InputColumn>& inputs, const Regress
   const InputColumn& input = inputs[regressor.input];
   if (regressor.second_input == regressor.input) return factor(input) + "^2";
   if (regressor.second_input >= 0) return factor(input) + "*" + factor(inputs[regressor.second_input]);
-  return regressor.level < 0 ? input.name : fmt::format("[{} = {}]", input.name, input.levels[regressor.level]);
+  return regressor.level < 0 ? input.name : fmt::format("[{} = {}]", input.name, input.shown_level(regressor.level));
 }
 
 std::string decimal(double value, std::optional<double> tolerance) {

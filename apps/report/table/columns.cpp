@@ -16,6 +16,7 @@ namespace llmt::report {
 namespace {
 
 constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_level = -1.0;  // a category that the model does not know
 
 // Names and their numbers, looked up without a copy.
 using Numbering = std::map<std::string, Eigen::Index, std::less<>>;
@@ -37,18 +38,25 @@ std::vector<std::string> take_levels(const Numbering& in_order_of_appearance, Ei
   return levels;
 }
 
-// Replaces the listed columns of `inputs` by categories.
-void read_categories(const Csv& csv, const std::vector<std::string>& names, const std::string& hint,
-                     InputColumns& inputs) {
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+// Replaces the listed columns of `inputs` by categories. `declared`: the names of those in which NA and the like are
+// words.
+void read_categories(const Csv& csv, const std::vector<std::string>& names, const std::vector<std::string>& declared,
+                     const std::string& hint, InputColumns& inputs) {
   std::vector<std::string> wanted;
   for (const int column : inputs.categorical) {
     wanted.push_back(names[column]);
   }
   std::vector<Numbering> seen(wanted.size());
+  std::vector<Numbering> marks(wanted.size());  // with their counts
   csv.visit_texts(wanted, [&](Eigen::Index row, std::size_t i, std::string_view text) {
     double& value = inputs.values(row, inputs.categorical[i]);
-    if (text.empty()) {
+    if (says_missing(text) && (text.empty() || !contains(declared, wanted[i]))) {
       value = no_value;
+      if (!text.empty()) ++marks[i].emplace(text, 0).first->second;
       return;
     }
     auto found = seen[i].find(text);
@@ -63,11 +71,8 @@ void read_categories(const Csv& csv, const std::vector<std::string>& names, cons
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const int column = inputs.categorical[i];
     inputs.levels[column] = take_levels(seen[i], inputs.values.col(column));
+    for (const auto& [text, count] : marks[i]) inputs.marked.push_back({column, text, count});
   }
-}
-
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::ranges::find(names, name) != names.end();
 }
 
 // Advice on the first of the cells that are no numbers: correct them if most cells of the column are numbers.
@@ -226,7 +231,11 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   values.conservativeResize(Eigen::NoChange, std::ssize(roles.inputs));
   result.inputs.values = std::move(values);
   result.inputs.levels.resize(num_inputs);
-  read_categories(csv, roles.inputs, advice.leave_out, result.inputs);
+  read_categories(csv, roles.inputs, roles.categorical, advice.leave_out, result.inputs);
+  for (int i = 0; i < static_cast<int>(num_inputs); ++i) {
+    const bool is_listed = std::ranges::count(result.inputs.marked, i, &MarkedCells::column) > 0;
+    result.inputs.has_other_marks = result.inputs.has_other_marks || (!is_listed && cells[i].marked > 0);
+  }
   return result;
 }
 
@@ -265,13 +274,22 @@ ModelInputs read_inputs(const Csv& csv, const std::vector<InputColumn>& model_in
       inputs.unseen_codes += !std::isnan(value) && !std::ranges::binary_search(codes, value) ? 1 : 0;
     }
     bad.push_back(is_number ? cells[i].first_other : ColumnCells::no_row);
-    inputs.missing += cells[i].missing;  // no category is a text that says that there is none
+    if (is_number) inputs.missing += cells[i].missing;
   }
   csv.refuse_first(columns, bad);
   csv.visit_texts(categorical, [&](Eigen::Index row, std::size_t i, std::string_view text) {
     const auto found = levels[i].find(text);
-    inputs.values(row, column_of[i]) = found == levels[i].end() ? no_value : static_cast<double>(found->second);
-    inputs.unknown += !text.empty() && found == levels[i].end() ? 1 : 0;
+    double& value = inputs.values(row, column_of[i]);
+    if (found != levels[i].end()) {
+      value = static_cast<double>(found->second);
+      inputs.missing += text.empty() ? 1 : 0;
+    } else if (says_missing(text)) {
+      value = no_value;
+      ++inputs.missing;
+    } else {
+      value = no_level;
+      ++inputs.unknown;
+    }
   });
   if (std::ssize(columns) < std::ssize(model_inputs)) {
     Eigen::MatrixXd all = Eigen::MatrixXd::Constant(csv.rows(), std::ssize(model_inputs), no_value);

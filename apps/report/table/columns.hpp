@@ -27,11 +27,20 @@ struct ColumnAdvice {
   std::string as_categories;  ///< stands before the column's name: "--categorical"
 };
 
+/// Cells of a column of words that say that there is no value, with one and the same text.
+struct MarkedCells {
+  int column = 0;
+  std::string text;  ///< NA and the like
+  Eigen::Index count = 0;
+};
+
 /// Inputs to learn from.
 struct InputColumns {
   Eigen::MatrixXd values;                        ///< rows x columns; NaN: missing; categories as positions in `levels`
   std::vector<std::vector<std::string>> levels;  ///< per column: sorted names; empty for numbers
   std::vector<int> categorical;                  ///< columns with levels
+  std::vector<MarkedCells> marked = {};          ///< of columns of words that nobody called categories
+  bool has_other_marks = false;                  ///< whether cells of other columns say so too
 };
 
 struct LearningColumns {
@@ -59,7 +68,8 @@ struct LargestMagnitude {
 void refuse_negative_weight(const Csv& csv, const std::string& column, const Eigen::VectorXd& weights);
 
 /// Reads the columns. An input is categorical if it is listed as such, or if none of its cells is a number, with a
-/// decimal comma either.
+/// decimal comma either. In a column that is listed every text is a word, NA and the like too, and only an empty cell
+/// is missing.
 ///
 /// Throws std::runtime_error `path:line: column "c": ...` for a cell that is needed as a number and is none, and for
 /// what the learner cannot take: numbers above `largest_input` (targets and weights: largest_magnitude), columns too

@@ -65,10 +65,13 @@ class ArrowTable {
 /// Whether a file begins as an Arrow file does. False for what is no regular file or cannot be read.
 bool is_arrow_file(const std::string& path);
 
-/// Writes a table of 64-bit floating-point numbers, NaN as missing, in batches of at most 65536 rows and 2^24 cells
-/// (but at least a row), through a temporary file as write_file(). Returns the number of rows. Throws
-/// std::invalid_argument if there is no name, a name is repeated, or rows have another number of columns; what `next`
-/// throws; and as write_file().
+/// Number of rows of a table of this number of columns that are in memory at a time, and in a batch of write_arrow():
+/// 65536, or as many as have 2^24 cells if that is fewer, and at least 1.
+Eigen::Index arrow_rows_at_once(std::size_t columns);
+
+/// Writes a table of 64-bit floating-point numbers, NaN as missing, in batches of arrow_rows_at_once() rows, through a
+/// temporary file as write_file(). Returns the number of rows. Throws std::invalid_argument if there is no name, a name
+/// is repeated, or rows have another number of columns; what `next` throws; and as write_file().
 Eigen::Index write_arrow(const std::string& path, const std::vector<std::string>& columns, const NextRows& next);
 
 }  // namespace llmt

@@ -23,8 +23,10 @@ namespace llmt {
 /// Rows that differ, which fit_boosted() needs.
 inline constexpr Eigen::Index fewest_boosted_rows = 10;
 
-/// Levels of a categorical input that fit_boosted() takes.
-inline constexpr int most_boosted_levels = 50;
+/// Levels of a categorical input that have features of their own in fit_boosted(), the most frequent ones; the others
+/// are told from these, not from each other. With more than 800 000 rows there are 200 000 000 / rows of them, but at
+/// least 50: each takes 7 bytes a row.
+inline constexpr int most_boosted_levels = 255;
 
 struct BoostOptions {
   /// Factor on every tree. 0: 0.1 where the trees are soft, else that of the table at fit_boosted().
@@ -58,8 +60,9 @@ struct BoostVariant {
 /// How the sum of one output was made.
 struct BoostSummary {
   Eigen::Index rows = 0;               ///< that the sum is fitted to; equal rows count once
-  Eigen::Index held_out = 0;           ///< rows that decided the variant and the number of trees
+  Eigen::Index held_out = 0;           ///< rows that `rmse` is of
   double rmse = 0.0;                   ///< on these, of the trees fitted without them, in the output's unit; or NaN
+  double spread = 0.0;                 ///< standard deviation of the RMSE of the five parts of these rows; 0: one part
   std::string variant;                 ///< the one taken; "blend": a mean; "mean": see BoostOptions::mean_of_few
   std::vector<BoostVariant> compared;  ///< empty: symmetric trees, without a choice
   Eigen::Index trees = 0;
@@ -78,7 +81,7 @@ struct BoostResult {
 /// | rows from | rate | slopes | c | patience | held out | race | one tree | splits from |
 /// | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 /// | 10 | 0.05 | 3 | 3 | 100 | each fifth in turn | no | RA, to 100 inputs | all rows |
-/// | 500 | 0.05 | 3 | 3 | 200 | a fifth | no | RA or RD, to 100 inputs | all rows |
+/// | 500 | 0.05 | 3 | 3 | 200 | a fifth; each for the error | no | RA or RD, to 100 inputs | all rows |
 /// | 5000 | 0.05 | 5 | 1 | 50 | a fifth | yes | RA, to 32 inputs, 200 trees | all rows |
 /// | 10 000 | 0.07 | 5 | 1 | 50 | a fifth | yes | RA, to 32 inputs, 200 trees | all rows |
 /// | 50 000 | 0.07 | 5 | 1 | 50 | a fifth | yes | none | all rows |
@@ -93,12 +96,12 @@ struct BoostResult {
 ///
 /// BoostedModel::intervals() gives intervals, from the held-out rows' residuals and their spread.
 ///
-/// Inputs may be missing (NaN). A category is taken as the indicators of its levels. Weights are as for fit(); a row of
+/// Inputs may be missing (NaN). A category is taken as the indicators of its most frequent levels,
+/// `most_boosted_levels` of them. Weights are as for fit(); a row of
 /// the weight k is k equal rows, to the byte. Up to the values of the seed, the result does not depend on the scale of
 /// outputs and inputs, nor on the number of threads, for which it is the same to the byte.
 ///
-/// Throws std::invalid_argument as fit(), for fewer than `fewest_boosted_rows` different rows, and for a categorical
-/// input of more than `most_boosted_levels` levels.
+/// Throws std::invalid_argument as fit(), and for fewer than `fewest_boosted_rows` different rows.
 BoostResult fit_boosted(const TrainingData& data, const BoostOptions& options = {}, const Progress& progress = {});
 
 }  // namespace llmt

@@ -78,6 +78,11 @@ std::vector<bool> used_inputs(const BoostedModel& model);
 /// that input's training range, see Extrapolation. 0 inside. Throws as BoostedModel::predict().
 std::vector<double> distance_outside(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs);
 
+/// Rows, ascending, that lack an input which the model uses: a number is missing, or a category is unknown, see
+/// InputColumn::levels. Intervals have the same width there as elsewhere, and are likely too narrow. Throws as
+/// BoostedModel::predict().
+std::vector<Eigen::Index> incomplete_rows(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs);
+
 /// The model as JSON text; docs/file-formats.md describes it. Numbers are written so that they read back exactly.
 /// Throws std::runtime_error for a model that load_boosted() would refuse because of its size.
 std::string to_json(const BoostedModel& model);

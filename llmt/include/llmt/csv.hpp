@@ -23,12 +23,17 @@
 
 namespace llmt {
 
+/// Whether the text of a cell, without outer blanks, says that there is no value: it is empty, or NA, N/A, NaN, null or
+/// ? (in any case).
+bool says_missing(std::string_view text);
+
 /// What the cells of a column are when they are read as numbers.
 struct ColumnCells {
   /// "There is no such row."
   static constexpr Eigen::Index no_row = std::numeric_limits<Eigen::Index>::max();
 
   Eigen::Index missing = 0;             ///< cells that are empty or say NA, N/A, NaN, null or ? (in any case)
+  Eigen::Index marked = 0;              ///< those of the missing that are not empty: NA and the like
   Eigen::Index other = 0;               ///< cells that are neither missing nor a finite number
   Eigen::Index infinite = 0;            ///< those of the others that are numbers, as inf or 1e400
   Eigen::Index other_mark = 0;          ///< those of the others that are numbers with the other decimal mark
@@ -134,13 +139,13 @@ class Csv {
   [[noreturn]] void refuse(Eigen::Index row, std::string_view column, const std::string& reason) const;
 
   /// Calls visit(row, i, text) for the cell of columns[i] in every row, in file order. The text has neither quotes nor
-  /// outer blanks, is empty for cells that numbers_or_missing() takes for missing, and lives as long as the call. A
-  /// column may be named once. Errors as index_of(); throws EncodingError `path:line: column "c": ...` at a cell that
-  /// is not UTF-8.
+  /// outer blanks, and lives as long as the call; whether NA is a word or no value is for the caller to say, see
+  /// says_missing(). A column may be named once. Errors as index_of(); throws EncodingError `path:line: column "c":
+  /// ...` at a cell that is not UTF-8.
   void visit_texts(std::span<const std::string> columns,
                    const std::function<void(Eigen::Index, std::size_t, std::string_view)>& visit) const;
 
-  /// One column as text, as visit_texts() has it; errors too.
+  /// One column as text, as visit_texts() has it, but empty where says_missing(); errors too.
   std::vector<std::string> texts(const std::string& column) const;
 
   /// The text of a row as it stands in the file, without its line end.

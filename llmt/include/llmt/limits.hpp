@@ -90,8 +90,8 @@ inline constexpr std::array limit_table = std::to_array<LimitRow>({
      LimitUnit::count, "refused with the tree's number"},
     {Limit::sum_leaf_slopes, "slopes in a leaf of a sum of trees", 12, LimitUnit::count, "refused with file and place"},
     // A leaf of 12 slopes at its limits may need 4095, the trees of fits need some ten.
-    {Limit::sum_trials, "inputs tried one by one to explain a tree of a sum, for a row and one to compare with", 10'000,
-     LimitUnit::count, "refused with the tree's place"},
+    {Limit::sum_trials, "inputs taken one by one to explain a tree of a sum, for a row and a row of the background",
+     10'000, LimitUnit::count, "refused with the tree's place"},
     {Limit::description_bytes, "robot description, mechanism, catalogue, terms", 1 << 24, LimitUnit::bytes, "refused"},
     {Limit::yaml_nodes, "keys, values and lists of a YAML file", 300'000, LimitUnit::count,
      "refused with file and line"},

@@ -97,9 +97,9 @@ class Model {
   const std::vector<Partition>& partitions() const { return partitions_; }
 
   /// Predictions, rows x outputs, for `inputs` (rows x inputs; NaN: missing; categorical inputs as positions in
-  /// InputColumn::levels, others than those count as missing, or as InputColumn::codes). Throws std::invalid_argument
-  /// if the number of columns differs or a value is infinite. Same bytes at any number of threads (0: all), and for a
-  /// row alone or among others.
+  /// InputColumn::levels, others than those are unknown categories, or as InputColumn::codes). Throws
+  /// std::invalid_argument if the number of columns differs or a value is infinite. Same bytes at any number of threads
+  /// (0: all), and for a row alone or among others.
   Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
   /// Derivatives of the prediction at one point, outputs x inputs, in closed form. Zero for categorical inputs, and of

@@ -112,13 +112,17 @@ struct InputColumn {
   double low = 0.0;     ///< smallest training value
   double high = 0.0;    ///< largest training value
   double centre = 0.0;  ///< mean of the training values; local models are written about it
-  /// Categorical input: the names of its values 0, 1, 2, ... Empty for numbers.
+  /// Categorical input: the names of its values 0, 1, 2, ... Empty for numbers. If the last name is empty, that level
+  /// is what a missing value (NaN) means: some training rows had none. Else a missing value is as an unknown category.
   std::vector<std::string> levels = {};
-  /// Numbers of the levels, ascending, where a row gives this categorical input as a number. Another number counts as
-  /// the nearest of them, of two the smaller. Empty: a row gives the position of the level.
+  /// Numbers of the levels with a name, ascending, where a row gives this categorical input as a number. Another number
+  /// counts as the nearest of them, of two the smaller. Empty: a row gives the position of the level.
   std::vector<double> codes = {};
 
   bool is_categorical() const { return !levels.empty(); }
+  bool has_empty_level() const { return is_categorical() && levels.back().empty(); }
+  /// The name of a level for people: "(empty)" for that of missing values.
+  std::string shown_level(std::size_t level) const { return levels[level].empty() ? "(empty)" : levels[level]; }
 };
 
 /// What a model knows of its outputs.

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -78,6 +79,18 @@ struct InputStep {
   double rmse = 0.0;
 };
 
+/// The held-out error, one entry an output of a partition, of rows whose inputs the training rows of their fold do not
+/// have, and of the others: what a prediction costs of new inputs, and of inputs that the table has
+/// (docs/algorithms/selection.md, "Rows with equal inputs"). NaN: there are no such rows.
+struct EqualRowErrors {
+  Eigen::VectorXd rmse_new;
+  /// Of repeats, which are held out together, the standard deviation of the rows of one setting about their mean: no
+  /// model predicts another row of that setting better.
+  Eigen::VectorXd rmse_known;
+  Eigen::Index rows_new = 0;
+  Eigen::Index rows_known = 0;  ///< 0 of repeats
+};
+
 /// How one partition was made.
 struct PartitionSummary {
   std::vector<int> outputs;       ///< columns that the partition serves
@@ -101,7 +114,8 @@ struct PartitionSummary {
   std::vector<int> left_out;       ///< inputs that FitOptions::choose_inputs left out, ascending
   /// What choose_inputs compared: all inputs first, then fewer. Empty: nothing.
   std::vector<InputStep> input_steps;
-  std::vector<RangeGuard> range_guards = {};  ///< one an output of the partition; empty without folds
+  std::vector<RangeGuard> range_guards = {};      ///< one an output of the partition; empty without folds
+  std::optional<EqualRowErrors> equal_rows = {};  ///< none: no two rows have equal inputs, or there are no folds
 };
 
 /// Which inputs are codes, that is, categories given as numbers (docs/algorithms/codes.md):

@@ -67,7 +67,7 @@ struct TaughtResult {
 ///
 /// Throws std::invalid_argument as fit(), with the words of why_not_taught() if there are any, if there are too few
 /// rows to hold some out, if an option is out of range, and what the teacher throws: as fit_boosted() for fewer than 10
-/// different rows in a fold and for a categorical input of more than 50 levels. Throws std::runtime_error if the
+/// different rows in a fold. Throws std::runtime_error if the
 /// answers of the teacher are not finite, or not one a row and output.
 TaughtResult fit_taught(const PreparedFit& prepared, const TeachOptions& teach = {}, const Progress& progress = {});
 TaughtResult fit_taught(const TrainingData& data, const FitOptions& options = {}, const TeachOptions& teach = {},

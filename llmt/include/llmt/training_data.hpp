@@ -23,7 +23,7 @@ namespace llmt {
 
 /// Matrices, and what is known of their rows and columns. What is empty is not known. Column indices count from 0.
 struct TrainingData {
-  Eigen::MatrixXd inputs = {};   ///< rows x inputs; NaN: missing
+  Eigen::MatrixXd inputs = {};   ///< rows x inputs; NaN: missing, of a category a level of its own
   Eigen::MatrixXd outputs = {};  ///< rows x outputs
   /// One a row, from 0 to 1e150; a row of weight 0 takes no part. Empty: all 1. If all are whole numbers, at most 10 on
   /// average over those that are not 0, they are counts: a row of weight k is k equal rows, to the last byte of the
@@ -40,7 +40,7 @@ struct TrainingData {
   std::vector<int> categorical_inputs = {};  ///< columns whose values are categories 0, 1, 2, ...
   /// For each input the names of its categories, which its values number from 0 on. No names: a number, or categories
   /// without names. An input with names is categorical. A category above the largest one that takes part in the fit is
-  /// not in the model, and counts as a missing value there.
+  /// not in the model, and is unknown there. Where values are missing, the model has one level more, without a name.
   std::vector<std::vector<std::string>> levels = {};
   /// Whether inputs of few whole numbers may be codes of categories (docs/algorithms/codes.md). They are taken for
   /// codes where that lowers the held-out error beyond chance: by RD, RETIS and RA with crisp leaves or blends, with
@@ -52,12 +52,12 @@ struct TrainingData {
 };
 
 /// Makes a column categorical: its values become the places of `words`, one a row, in the sorted list of the different
-/// words, and `data.levels` takes this list. An empty word is a missing value. Throws std::invalid_argument if there is
-/// no such column, or if there are more or fewer words than rows.
+/// words, and `data.levels` takes this list. An empty word is a missing value (NaN). Throws std::invalid_argument if
+/// there is no such column, or if there are more or fewer words than rows.
 void set_categories(TrainingData& data, int input, std::span<const std::string> words);
 
-/// The values of a categorical input: the place of each word among the levels, NaN (missing) for a word that is not
-/// there.
+/// The values of a categorical input: the place of each word among the levels, NaN (missing) for an empty word, and -1,
+/// which is no level, for another word that is not there.
 Eigen::VectorXd category_values(std::span<const std::string> words, std::span<const std::string> levels);
 
 }  // namespace llmt

@@ -164,17 +164,10 @@ class ArrowWriter {
   Eigen::Index rows_ = 0;
 };
 
-// Rows that are in memory at a time: those of a batch, fewer if there are many columns.
-Eigen::Index rows_of_batch(std::size_t columns) {
-  constexpr std::size_t most_rows = 65536;
-  constexpr std::size_t most_cells = std::size_t{1} << 24;
-  return static_cast<Eigen::Index>(std::clamp<std::size_t>(most_cells / columns, 1, most_rows));
-}
-
 // Passes an Arrow file on in pieces. Returns the number of rows.
 Eigen::Index pass_rows(const TextSink& sink, const std::vector<std::string>& columns, const NextRows& next) {
   ArrowWriter writer(sink, columns);
-  const Eigen::Index most = rows_of_batch(columns.size());
+  const Eigen::Index most = arrow_rows_at_once(columns.size());
   Eigen::MatrixXd waiting(0, std::ssize(columns));  // grows: a table of few rows takes no room for many
   Eigen::Index filled = 0;
   while (const std::optional<Eigen::MatrixXd> given = next()) {
@@ -207,6 +200,13 @@ void check_columns(const std::vector<std::string>& columns) {
 }
 
 }  // namespace
+
+Eigen::Index arrow_rows_at_once(std::size_t columns) {
+  constexpr std::size_t most_rows = 65536;
+  constexpr std::size_t most_cells = std::size_t{1} << 24;
+  return static_cast<Eigen::Index>(
+      std::clamp<std::size_t>(most_cells / std::max<std::size_t>(columns, 1), 1, most_rows));
+}
 
 Eigen::Index write_arrow(const std::string& path, const std::vector<std::string>& columns, const NextRows& next) {
   check_columns(columns);

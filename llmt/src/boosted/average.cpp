@@ -177,6 +177,7 @@ Average with_one_tree(const BoostingData& data, const Eigen::VectorXd& output, A
     sum.parts[k].share = shares(k);
     sum.variants.end()[k - 2].share = shares(k);
   }
+  if (shares(1) > 0.0) sum.tree = tried->options;
   std::erase_if(sum.parts, [](const SumPart& part) { return part.share == 0.0; });
   sum.train_rmse = train_rmse_of(sum.parts, data.rows.weights);
   return sum;

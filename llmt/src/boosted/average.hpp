@@ -3,12 +3,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "boosted/boosting.hpp"
 #include "boosted/boosting_data.hpp"
 #include "llmt/boosted.hpp"
+#include "llmt/options.hpp"
 
 namespace llmt {
 
@@ -25,6 +27,7 @@ struct Average {
   Eigen::VectorXd residuals = {};           ///< of the held-out rows, of trees fitted without them
   double rmse = 0.0;                        ///< of these
   double train_rmse = 0.0;
+  std::optional<FitOptions> tree = {};  ///< of the one tree that with_one_tree() took, with nothing left to choose
 };
 
 /// Few rows: the mean of symmetric trees, soft ones and one tree, fitted to all rows. Where there is no tree, soft ones

@@ -47,10 +47,10 @@ struct DifferentRows {
   std::vector<double> weights;
 };
 
-DifferentRows different_rows(const GivenRows& given, int max_threads) {
+DifferentRows different_rows(const GivenRows& given) {
   const std::vector<Eigen::Index> rows = counted_rows(given);
-  const RowNumbers numbers = given.numbers ? at(*given.numbers, rows)
-                                           : number_rows(given.inputs.values, given.outputs.values, rows, max_threads);
+  const RowNumbers numbers =
+      given.numbers ? at(*given.numbers, rows) : number_rows(given.inputs.values, given.outputs.values, rows);
   const bool weighted = given.weights.size() > 0 && !given.are_counts;
   DifferentRows result;
   std::map<std::tuple<int, double, bool>, std::size_t> seen;
@@ -145,13 +145,12 @@ std::pair<InputColumn, double> describe(const TrainingData& data, const GivenRow
   column.centre = std::clamp(sum / weight, low, high);
   if (std::ranges::count(given.categorical, place) > 0) {
     const auto levels = static_cast<int>(high) + 1;
-    if (levels > most_boosted_levels) {
-      throw std::invalid_argument(
-          fmt::format("llmt::fit_boosted: input \"{}\" has {} levels, boosting takes at most {}; leave it out, or put "
-                      "rare levels together",
-                      column.name, levels, most_boosted_levels));
-    }
+    const bool has_empty_level = !given.empty_levels.empty() && std::cmp_equal(given.empty_levels[place], levels);
     for (int level = 0; level < levels; ++level) {
+      if (has_empty_level && level + 1 == levels) {
+        column.levels.emplace_back();
+        break;
+      }
       const bool has_name = !data.levels.empty() && !data.levels[place].empty();
       column.levels.push_back(has_name ? data.levels[place][level] : fmt::format("{}", level));
     }
@@ -178,6 +177,25 @@ void describe_columns(const TrainingData& data, const GivenRows& given, Boosting
   }
 }
 
+// The levels of an input that have features, ascending: the most frequent ones.
+std::vector<int> levels_with_features(const BoostingData& data, int input) {
+  constexpr Eigen::Index fewest = 50;
+  constexpr Eigen::Index most_cells_of_levels = 200'000'000;
+  std::vector<int> levels(data.inputs[input].levels.size());
+  std::iota(levels.begin(), levels.end(), 0);
+  const Eigen::Index most = std::clamp<Eigen::Index>(most_cells_of_levels / data.x.rows(), fewest, most_boosted_levels);
+  if (std::ssize(levels) <= most) return levels;
+  std::vector<double> weights(levels.size(), 0.0);
+  for (Eigen::Index i = 0; i < data.x.rows(); ++i) {
+    const double level = data.x(i, input);
+    if (!std::isnan(level)) weights[static_cast<std::size_t>(level)] += data.rows.weights(i);
+  }
+  std::ranges::stable_sort(levels, std::ranges::greater(), [&](int level) { return weights[level]; });
+  levels.resize(most);
+  std::ranges::sort(levels);
+  return levels;
+}
+
 }  // namespace
 
 BinnedFeature feature_of(const BoostingData& data, const BoostedFeature& feature) {
@@ -202,7 +220,7 @@ HoldOut part_apart(const std::vector<int>& parts, int part) {
 BoostingData boosting_data(const TrainingData& data, const BoostOptions& options) {
   check_options(options);
   const GivenRows given = checked(given_rows(data), {.max_threads = options.max_threads});
-  DifferentRows different = different_rows(given, options.max_threads);
+  DifferentRows different = different_rows(given);
   const Eigen::Index count = std::ssize(different.first);
   const bool few = count < fewest_boosted_rows;
   if (few && !options.mean_of_few) {
@@ -236,9 +254,8 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
   const Eigen::Index turns = result.regime.takes_turns ? num_parts_of(result.regime, count) : 1;
   for (int part = 0; part < turns; ++part) result.hold_outs.push_back(part_apart(result.parts, part));
   for (int j = 0; j < std::ssize(result.inputs); ++j) {
-    const int levels = count_of(result.inputs[j].levels);
-    if (levels == 0) result.rows.features.push_back(feature_of(result, {.first = j}));
-    for (int level = 0; level < levels; ++level) {
+    if (!result.inputs[j].is_categorical()) result.rows.features.push_back(feature_of(result, {.first = j}));
+    for (const int level : levels_with_features(result, j)) {
       result.rows.features.push_back(feature_of(result, {.first = j, .level = level}));
     }
   }

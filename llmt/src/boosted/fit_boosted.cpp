@@ -2,9 +2,11 @@
 #include <cmath>
 #include <limits>
 
+#include "boosted/all_fifths.hpp"
 #include "boosted/average.hpp"
 #include "boosted/race.hpp"
 #include "llmt/boosted.hpp"
+#include "llmt/statistics.hpp"
 #include "spread/fit_spread.hpp"
 
 namespace llmt {
@@ -27,9 +29,8 @@ struct DealtRows {
   int parts = 1;
 };
 
-DealtRows dealt_rows(const BoostingData& data) {
-  const int folds = static_cast<int>(data.hold_outs.size());
-  if (data.regime.takes_turns) return {all_rows(data.y.rows()), data.parts, folds};
+DealtRows dealt_rows(const BoostingData& data, Eigen::Index held_out) {
+  if (held_out == data.y.rows()) return {all_rows(held_out), data.parts, std::ranges::max(data.parts) + 1};
   const std::vector<int>& rows = data.hold_outs.front().held_out;
   return {rows, dealt_parts(std::ssize(rows), parts_of_one_fold), parts_of_one_fold};
 }
@@ -38,7 +39,7 @@ DealtRows dealt_rows(const BoostingData& data) {
 std::vector<SumResiduals> held_out_residuals(const BoostingData& data, Eigen::Index output,
                                              const Eigen::VectorXd& residuals) {
   constexpr std::size_t most = 10000;
-  const DealtRows of = dealt_rows(data);
+  const DealtRows of = dealt_rows(data, residuals.size());
   const Eigen::MatrixXd x = data.x(of.rows, Eigen::all);
   const Eigen::VectorXd predictions = data.y.col(output)(of.rows) - residuals;
   const Eigen::VectorXd errors = residuals.cwiseAbs();
@@ -92,14 +93,34 @@ Eigen::VectorXd left_by(const Rounds& rounds, double rate, const BinnedRows& row
   return left;
 }
 
+// The standard deviation of the errors of the parts of the rows; `residuals`: of all rows, in their order.
+double spread_of_parts(const BoostingData& data, const Eigen::VectorXd& residuals) {
+  Eigen::VectorXd of_parts(std::ranges::max(data.parts) + 1);
+  for (int part = 0; part < of_parts.size(); ++part) {
+    const std::vector<int> rows = part_apart(data.parts, part).held_out;
+    of_parts(part) = rmse_of(residuals(rows), data.rows.weights(rows));
+  }
+  return spread_of(of_parts);
+}
+
+// The error of all rows in the place of that of the part 0, whose rows chose.
+void use_all_parts(const BoostingData& data, Eigen::VectorXd residuals, Average& result, BoostSummary& summary) {
+  residuals(data.hold_outs.front().held_out) = result.residuals;
+  summary.held_out = residuals.size();
+  result.rmse = rmse_of(residuals, data.rows.weights);
+  result.residuals = std::move(residuals);
+}
+
 // The sum that one set of held-out rows stops, and one tree beside it.
-Average stopped(const BoostingData& data, const Eigen::VectorXd& output, const SumPlan& plan, Random& random,
-                BoostSummary& summary, Work& work) {
+Average stopped(const BoostingData& data, const Eigen::VectorXd& output, const SumPlan& plan,
+                const BoostOptions& options, Random& random, BoostSummary& summary, Work& work) {
   const HoldOut& apart = data.hold_outs.front();
   const Regime& regime = data.regime;
+  const bool uses_all_parts = regime.uses_all_parts && !data.is_hold_out_given;
   const bool is_refitted = !data.is_hold_out_given && is_worth_refitting(std::ssize(apart.held_out), output.size());
-  Work stopping(work, (is_refitted ? 0.4 : 1.0) * work.left());
+  Work stopping(work, (uses_all_parts ? 0.2 : is_refitted ? 0.4 : 1.0) * work.left());
   Rounds rounds = boost(plan.rows, output, apart.train, apart.held_out, {}, plan.rounds, random, stopping);
+  const Eigen::Index trees = std::ssize(rounds.trees);
   summary.held_out = std::ssize(apart.held_out);
   summary.rows = is_refitted ? output.size() : std::ssize(apart.train);
   Average result{.variants = plan.compared, .residuals = rounds.residuals, .rmse = rounds.rmse};
@@ -111,7 +132,7 @@ Average stopped(const BoostingData& data, const Eigen::VectorXd& output, const S
     more.most_rounds = static_cast<int>(std::ceil(more_trees * static_cast<double>(rounds.trees.size())));
     std::vector<GrowingTree> kept;
     if (regime.races && more.tree.symmetric) kept = std::move(rounds.trees);
-    Work refitting(work, (is_tree_tried ? 0.7 : 1.0) * work.left());
+    Work refitting(work, (uses_all_parts ? 0.3 : is_tree_tried ? 0.7 : 1.0) * work.left());
     rounds = boost(plan.rows, output, all_rows(output.size()), {}, kept, more, random, refitting);
   } else if (is_tree_tried) {
     rounds.residuals = left_by(rounds, plan.rounds.rate, plan.rows, output);  // a tree beside it is of all rows
@@ -125,8 +146,14 @@ Average stopped(const BoostingData& data, const Eigen::VectorXd& output, const S
   // The errors of a race are those of a few rounds, not of the sum.
   result.rmse = rmse_of(result.residuals, data.rows.weights(apart.held_out));
   result.variants.push_back({plan.name, result.rmse, 1.0});
-  Work part(work, work.left());
-  return with_one_tree(data, output, std::move(result), plan.rounds.max_threads, part);
+  Work part(work, (uses_all_parts ? 0.3 : 1.0) * work.left());
+  result = with_one_tree(data, output, std::move(result), plan.rounds.max_threads, part);
+  if (!uses_all_parts) return result;
+  const Eigen::Vector2d shares(result.variants.front().share, result.tree ? result.variants.back().share : 0.0);
+  std::optional<Eigen::VectorXd> others =
+      residuals_of_other_parts(data, output, {plan, trees, shares, result.tree}, options.seed, work);
+  if (others) use_all_parts(data, *std::move(others), result, summary);
+  return result;
 }
 
 BoostedSum fit_output(const BoostingData& data, Eigen::Index output, const BoostOptions& options, BoostSummary& summary,
@@ -152,9 +179,10 @@ BoostedSum fit_output(const BoostingData& data, Eigen::Index output, const Boost
     summary.rows = summary.held_out = y.size();
     result = average(data, y, plan.rounds, options.rate > 0.0, random, work);
   } else {
-    result = stopped(data, y, plan, random, summary, work);
+    result = stopped(data, y, plan, options, random, summary, work);
   }
   summary.rmse = scale * result.rmse;
+  if (result.residuals.size() == y.size()) summary.spread = scale * spread_of_parts(data, result.residuals);
   summary.train_rmse = scale * result.train_rmse;
   summary.variant = result.parts.size() > 1 ? "blend" : plan.name;
   summary.compared = std::move(result.variants);

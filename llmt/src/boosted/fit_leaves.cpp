@@ -21,7 +21,14 @@ void visit(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row, in
     const GrowingNode& node = tree[index];
     const BinnedFeature& column = rows.features[node.feature];
     const std::uint16_t cell = column.cells[row];
-    if (node.half_width > 0.0 && cell != missing_cell) {
+    if (cell == missing_cell) {
+      const double left = node.missing_left;
+      if (left > 0.0 && left < 1.0) visit(tree, rows, row, node.left, share * left, to);
+      share *= left == 1.0 ? 1.0 : 1.0 - left;
+      index = left == 1.0 ? node.left : node.right;
+      continue;
+    }
+    if (node.half_width > 0.0) {
       const double z = column.values[row];
       if (std::abs(z - column.edges[node.cell]) < node.half_width) {
         const double right = share_of_right(z, column.edges[node.cell], node.half_width);
@@ -33,7 +40,7 @@ void visit(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row, in
         }
       }
     }
-    index = (cell == missing_cell ? node.missing_left : cell <= node.cell) ? node.left : node.right;
+    index = cell <= node.cell ? node.left : node.right;
   }
   to(index, share);
 }
@@ -124,6 +131,7 @@ void TreeGrower::fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::spa
     return shares.empty() ? sums(false_type(), true_type()) : sums(true_type(), true_type());
   });
   add_estimate(leaf.model, size, leaf_sums, options_.ridges);
+  leaf.model.means = means_of(leaf_sums, leaf.model.features, lacked_);
 }
 
 // A leaf without rows keeps its path's model within the range of the rows of the nearest node above.
@@ -197,8 +205,8 @@ BoostedTree finished(const GrowingTree& tree, const BinnedRows& rows) {
     const GrowingNode& node = tree[k];
     if (node.feature >= 0) {
       number[k] = static_cast<int>(result.splits.size());
-      result.splits.push_back(
-          {node.feature, rows.features[node.feature].edges[node.cell], node.half_width, node.missing_left, 0, 0});
+      result.splits.push_back({node.feature, rows.features[node.feature].edges[node.cell], node.half_width,
+                               rounded_stand_in(node.missing_left), 0, 0});
     } else {
       number[k] = -1 - static_cast<int>(result.leaves.size());
       const PathModel& model = node.model;
@@ -206,7 +214,11 @@ BoostedTree finished(const GrowingTree& tree, const BinnedRows& rows) {
                                .low = model.low,
                                .high = model.high,
                                .features = {model.features.begin(), model.features.end()},
-                               .slopes = {model.slopes.begin(), model.slopes.begin() + model.features.size()}});
+                               .slopes = {model.slopes.begin(), model.slopes.begin() + model.features.size()},
+                               .means = {}});
+      for (std::size_t j = 0; j < model.features.size(); ++j) {
+        result.leaves.back().means.push_back(rounded_stand_in(model.means[j]));
+      }
     }
   }
   for (std::size_t k = 0; k < tree.size(); ++k) {

@@ -8,7 +8,7 @@
 namespace llmt {
 
 TreeGrower::TreeGrower(const BinnedRows& rows, Eigen::Index count, TreeOptions options, int max_threads)
-    : rows_(rows), count_(count), options_(options), max_threads_(max_threads) {}
+    : rows_(rows), count_(count), options_(options), max_threads_(max_threads), lacked_(lacked_features(rows, count)) {}
 
 void TreeGrower::begin(const Eigen::VectorXd& residuals) {
   order_.resize(count_);
@@ -71,21 +71,38 @@ std::vector<int> some_features(std::size_t all, double share, Random& random) {
   return result;
 }
 
+std::vector<bool> lacked_features(const BinnedRows& rows, Eigen::Index count) {
+  std::vector<bool> lacked;
+  for (std::size_t k = 0; k < rows.features.size(); ++k) {
+    const auto cells = std::span(rows.features[k].cells).first(count);
+    lacked.push_back(rows.features[k].has_missing && std::ranges::find(cells, missing_cell) != cells.end());
+  }
+  return lacked;
+}
+
+Slopes means_of(const RegressorSums& sums, const SlopeFeatures& features, const std::vector<bool>& lacked) {
+  Slopes means = {};
+  for (std::size_t k = 0; k < features.size(); ++k) means[k] = lacked[features[k]] ? 0.0 : sums.z[k] / sums.n;
+  return means;
+}
+
 FeatureGains::FeatureGains(const BinnedRows& rows, int feature) : feature_(feature), column_(&rows.features[feature]) {
   for (Gains& gains : gains_) gains.fill(0.0);
 }
 
 void FeatureGains::add(const Histogram& histogram, const PackedUnits& units, const Ridges& ridges, bool slopes) {
+  has_missing_ = has_missing_ || histogram[missing_bin] != 0;
   add_gains(gains_[0], *column_, histogram, units, ridges, slopes, false);
   if (column_->has_missing) add_gains(gains_[1], *column_, histogram, units, ridges, slopes, true);
 }
 
 SplitChoice FeatureGains::best() const {
   SplitChoice best;
-  for (const bool missing_left : {false, true}) {
-    if (missing_left && !column_->has_missing) continue;
+  for (const int missing_left : {0, 1}) {
+    if (missing_left == 1 && !has_missing_) continue;
     for (int t = 0; t + 1 < column_->num_bins(); ++t) {
-      best.take_if_better({gains_[missing_left ? 1 : 0][t], feature_, column_->last_cells[t], missing_left});
+      best.take_if_better({gains_[missing_left][t], feature_, column_->last_cells[t],
+                           has_missing_ ? missing_left : SplitChoice::undecided});
     }
   }
   return best;
@@ -126,12 +143,16 @@ SplitChoice TreeGrower::best_split(std::span<const int> leaves, Random& random) 
 void TreeGrower::split_rows(int index) {
   GrowingNode& node = tree_[index];
   const bool has_weights = !rows_.equal_weights;
+  const bool missing_left = node.missing_left >= 0.5;
+  const auto is_lacking = [](int cell) { return cell == missing_cell || cell < 0; };
+  const bool is_decided =
+      lacked_[node.feature] && std::any_of(cells_.begin() + node.begin, cells_.begin() + node.end, is_lacking);
   // Rows of the right side wait in the same places of the spare lists: other nodes have other places.
   Eigen::Index left = node.begin;
   Eigen::Index right = node.begin;
   for (Eigen::Index k = node.begin; k < node.end; ++k) {
     const int cell = cells_[k];
-    const bool is_left = cell == missing_cell ? node.missing_left : cell <= node.cell;  // -1: missing too
+    const bool is_left = cell == missing_cell ? missing_left : cell <= node.cell;  // -1: missing too
     spare_order_[right] = order_[left] = order_[k];
     spare_values_[right] = values_[left] = values_[k];
     spare_residuals_[right] = residuals_[left] = residuals_[k];
@@ -150,6 +171,17 @@ void TreeGrower::split_rows(int index) {
   l.begin = node.begin;
   l.end = r.begin = left;
   r.end = node.end;
+  const double weight = weight_of(node);
+  if (is_decided) {
+    node.missing_left = missing_left ? 1.0 : 0.0;
+  } else if (weight > 0.0) {
+    node.missing_left = weight_of(l) / weight;
+  }
+}
+
+double TreeGrower::weight_of(const GrowingNode& node) const {
+  if (rows_.equal_weights) return static_cast<double>(node.count());
+  return std::accumulate(weights_.begin() + node.begin, weights_.begin() + node.end, 0.0);
 }
 
 // The constant and the slope in the split's feature that the side's residuals ask for.

@@ -49,18 +49,22 @@ class SlopeFeatures {
 /// The model of a node: what the splits on the way to it added.
 struct PathModel : LeafModel {
   SlopeFeatures features = {};
+  Slopes means = {};  ///< as BoostedLeaf
 
   double at(const BinnedRows& rows, Eigen::Index row) const {
     double value = constant;
-    for (std::size_t k = 0; k < features.size(); ++k) value += slopes[k] * rows.features[features[k]].values[row];
+    for (std::size_t k = 0; k < features.size(); ++k) {
+      const BinnedFeature& feature = rows.features[features[k]];
+      value += slopes[k] * (feature.cells[row] == missing_cell ? means[k] : static_cast<double>(feature.values[row]));
+    }
     return value;
   }
 };
 
 struct GrowingNode {
-  int feature = -1;  ///< -1: a leaf
-  int cell = 0;      ///< the last one of the left side
-  bool missing_left = false;
+  int feature = -1;           ///< -1: a leaf
+  int cell = 0;               ///< the last one of the left side
+  double missing_left = 0.0;  ///< as BoostedSplit
   double half_width = 0.0;
   int left = -1;
   int right = -1;
@@ -76,10 +80,12 @@ using GrowingTree = std::vector<GrowingNode>;
 
 /// A split of the rows of some leaves.
 struct SplitChoice {
+  static constexpr double undecided = 0.5;
+
   double gain = 0.0;
-  int feature = -1;  ///< -1: none gains
-  int cell = 0;      ///< the last one of the left side
-  bool missing_left = false;
+  int feature = -1;                 ///< -1: none gains
+  int cell = 0;                     ///< the last one of the left side
+  double missing_left = undecided;  ///< 0 or 1 where rows lack the feature, else undecided
 
   void take_if_better(const SplitChoice& other) {
     if (other.gain > gain) *this = other;
@@ -99,6 +105,7 @@ class FeatureGains {
  private:
   int feature_ = -1;
   const BinnedFeature* column_ = nullptr;
+  bool has_missing_ = false;    // in one of the leaves
   std::array<Gains, 2> gains_;  // the second one with missing values on the left
 };
 
@@ -114,6 +121,12 @@ SplitChoice best_of_all(std::span<const int> features, int max_threads, const Be
   for (const SplitChoice& one : of_some) best.take_if_better(one);
   return best;
 }
+
+/// Of each feature, whether some of the first `count` rows lack it.
+std::vector<bool> lacked_features(const BinnedRows& rows, Eigen::Index count);
+
+/// The means of the features that have slopes in the leaf's rows, 0 of those that rows of the fit lack: BoostedLeaf.
+Slopes means_of(const RegressorSums& sums, const SlopeFeatures& features, const std::vector<bool>& lacked);
 
 /// The features that a level, or a leaf of a free tree, looks at, in ascending order.
 std::vector<int> some_features(std::size_t all, double share, Random& random);
@@ -166,6 +179,7 @@ class TreeGrower {
   bool may_have_slope(const GrowingNode& node, int feature) const;
   void split(std::span<const int> leaves, std::span<const SplitChoice> choices);
   void split_rows(int node);
+  double weight_of(const GrowingNode& node) const;
   void add_to_path(GrowingNode& side, int feature);
   double half_width_of(int node) const;
   bool blends_well(int node, double half_width) const;
@@ -183,6 +197,7 @@ class TreeGrower {
   const Eigen::Index count_;
   const TreeOptions options_;
   const int max_threads_;
+  const std::vector<bool> lacked_;  // of each feature, by rows that are learned from
   GrowingTree tree_;
   std::vector<int> order_;         // the rows, those of a node together
   std::vector<double> residuals_;  // of the node's own model, in that order

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "boosted/split_gain.hpp"
@@ -34,6 +35,10 @@ struct LeafModel {
 /// beta += (Z'Z + ridge I)^-1 Z'e about the path's model, all centred in the leaf; the constant is shrunk by its ridge.
 /// The range is that of the rows' outputs and a tenth more on either side. The rows' weights must not all be 0.
 void add_estimate(LeafModel& model, int slopes, const RegressorSums& sums, const Ridges& ridges);
+
+/// What stands in for a missing value, to three digits behind the point: all of its digits would make a model file a
+/// third longer and say nothing of a value that is not there.
+inline double rounded_stand_in(double value) { return std::round(1000.0 * value) / 1000.0 + 0.0; }
 
 /// What the rows on one side of a split ask for: a constant and, with has_slope, a slope in the split's feature.
 struct SideModel {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "boosted/leaf_model.hpp"
 #include "boosted/model/boosted_checks.hpp"
 
 namespace llmt {
@@ -71,6 +72,10 @@ std::vector<BoostedTree> linear_start(const BinnedRows& rows, const Eigen::Vecto
     BoostedLeaf leaf{.constant = 0.0, .low = values.minCoeff() - margin, .high = values.maxCoeff() + margin};
     leaf.features.push_back(static_cast<int>(j));
     leaf.slopes.push_back(slopes(j));
+    const BinnedFeature& feature = rows.features[j];
+    const auto is_lacking = [&](int row) { return feature.cells[row] == missing_cell; };
+    const double mean = column_of(feature)(train).dot(weights) / weights.sum();
+    leaf.means.push_back(std::ranges::any_of(train, is_lacking) ? 0.0 : rounded_stand_in(mean));
     trees.push_back({.splits = {}, .leaves = {leaf}});
   }
   return trees;

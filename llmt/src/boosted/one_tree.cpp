@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "boosted/leaf_model.hpp"
 #include "boosted/linear_start.hpp"
 #include "boosted/model/boosted_checks.hpp"
 #include "fit/pipeline.hpp"
@@ -20,7 +21,7 @@ FitOptions options_of(GrowthRule rule, int max_threads) {
   return options;
 }
 
-// A sum has no split that sends several levels to one side, and no mean of a leaf for an empty cell.
+// A sum has no split that sends several levels to one side, and the means of its leaves are only for what no row lacks.
 bool may_have_tree(const BoostingData& data) {
   return !data.regime.rules_of_tree.empty() && !data.x.hasNaN() &&
          std::ranges::none_of(data.inputs, &InputColumn::is_categorical);
@@ -43,6 +44,8 @@ BoostedLeaf leaf_of(const Node& node, const std::vector<Regressor>& regressors, 
     leaf.constant += slope * (data.inputs[input].centre - regressors[k].centre);
     leaf.features.push_back(input);
     leaf.slopes.push_back(slope * data.deviations[input]);
+    const double mean = regressors[k].centre + node.mean(k) - data.inputs[input].centre;
+    leaf.means.push_back(rounded_stand_in(mean / data.deviations[input]));
   }
   return leaf;
 }
@@ -52,7 +55,7 @@ BoostedSplit split_of(const Node& node, const BoostingData& data) {
   return {.feature = node.split_input,
           .threshold = (node.threshold - data.inputs[node.split_input].centre) / deviation,
           .half_width = node.half_width / deviation,
-          .missing_left = node.missing_left >= 0.5};
+          .missing_left = rounded_stand_in(node.missing_left)};
 }
 
 double value_at(const BoostedLeaf& leaf, const BinnedRows& rows, int row) {
@@ -198,6 +201,13 @@ std::optional<BoostedTree> tree_of_all(const BoostingData& data, const Eigen::Ve
                                        Work& work) {
   const FitResult fitted = fit_tree(rows_of(data, output), tried.options, work);
   return translated(fitted.model, data, all_rows(output.size()), tried.options.max_threads);
+}
+
+std::optional<Eigen::VectorXd> residuals_without(const BoostingData& data, const Eigen::VectorXd& output,
+                                                 const HoldOut& rows, const FitOptions& options, Work& work) {
+  const FitResult fitted =
+      fit_tree(rows_at(rows_of(data, output), {rows.train.begin(), rows.train.end()}), options, work);
+  return residuals_of(fitted.model, data, output, rows, options.max_threads);
 }
 
 SumPart part_of(const BoostedTree& tree, const Eigen::VectorXd& output, const BinnedRows& rows) {

@@ -39,6 +39,11 @@ std::optional<TriedTree> try_tree(const BoostingData& data, const Eigen::VectorX
 std::optional<BoostedTree> tree_of_all(const BoostingData& data, const Eigen::VectorXd& output, const TriedTree& tried,
                                        Work& work);
 
+/// The residuals of the rows `rows.held_out`, of the same tree fitted to the rows `rows.train`. Nothing as
+/// tree_of_all().
+std::optional<Eigen::VectorXd> residuals_without(const BoostingData& data, const Eigen::VectorXd& output,
+                                                 const HoldOut& rows, const FitOptions& options, Work& work);
+
 /// The tree as a part of a sum, with its residuals in all rows.
 SumPart part_of(const BoostedTree& tree, const Eigen::VectorXd& output, const BinnedRows& rows);
 

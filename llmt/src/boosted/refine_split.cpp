@@ -53,7 +53,7 @@ SplitChoice TreeGrower::refined(std::span<const int> leaves, SplitChoice choice)
     const GrowingNode& node = tree_[leaves[i]];
     gather(node, choice.feature);
     if (column.has_missing) {  // their cell lies before all others, or behind them
-      const int missing_at = choice.missing_left ? -1 : missing_cell;
+      const int missing_at = choice.missing_left == 1.0 ? -1 : missing_cell;
       for (Eigen::Index k = node.begin; k < node.end; ++k) {
         if (cells_[k] == missing_cell) cells_[k] = missing_at;
       }

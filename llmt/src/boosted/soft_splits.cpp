@@ -30,7 +30,7 @@ void look_up(std::span<const int> rows, const GrowingNode& node, const BinnedFea
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (cells[rows[k]] != missing_cell) continue;
     z[k] = std::numeric_limits<double>::quiet_NaN();
-    is_right[k] = node.missing_left ? 0.0 : 1.0;
+    is_right[k] = 1.0 - node.missing_left;
   }
 }
 

@@ -98,6 +98,34 @@ void list_window(std::vector<int>& rows, const std::uint16_t* cells, RowSpan blo
   rows.resize(static_cast<std::size_t>(next - rows.data()));
 }
 
+// The rows from `first` on that lack a feature which no row before them lacks.
+std::vector<int> lacking_rows(const BinnedRows& rows, Eigen::Index first, const std::vector<bool>& lacked) {
+  std::vector<int> lacking;
+  for (std::size_t k = 0; k < rows.features.size(); ++k) {
+    const BinnedFeature& feature = rows.features[k];
+    if (!feature.has_missing || lacked[k]) continue;
+    for (Eigen::Index row = first; row < std::ssize(feature.cells); ++row) {
+      if (feature.cells[row] == missing_cell) lacking.push_back(static_cast<int>(row));
+    }
+  }
+  std::ranges::sort(lacking);
+  const auto repeated = std::ranges::unique(lacking);
+  lacking.erase(repeated.begin(), repeated.end());
+  return lacking;
+}
+
+// One side for the rows of all nodes of a level that lack the feature: that of most rows if no such row was searched.
+void decide(SplitChoice& choice, std::span<const SumsOfLeaf> sums) {
+  if (choice.missing_left == 0.0 || choice.missing_left == 1.0) return;
+  double left = 0.0;
+  double all = 0.0;
+  for (const SumsOfLeaf& leaf : sums) {
+    left += leaf.left.weight;
+    all += leaf.all.weight;
+  }
+  choice.missing_left = 2.0 * left >= all ? 1.0 : 0.0;
+}
+
 LLMT_FOR_EACH_INSTRUCTION_SET
 void to_sides(std::uint8_t* __restrict leaves, const std::uint16_t* cells, std::size_t count, std::uint16_t cell,
               std::uint16_t missing) {
@@ -119,7 +147,12 @@ void subtract_sides(double* __restrict residuals, const std::uint8_t* leaves, co
 }  // namespace
 
 SymmetricGrower::SymmetricGrower(const BinnedRows& rows, Eigen::Index count, TreeOptions options, int max_threads)
-    : rows_(rows), count_(count), options_(options), max_threads_(max_threads) {}
+    : rows_(rows),
+      count_(count),
+      options_(options),
+      max_threads_(max_threads),
+      lacked_(lacked_features(rows, count)),
+      lacking_(lacking_rows(rows, count, lacked_)) {}
 
 void SymmetricGrower::begin(const Eigen::VectorXd& residuals, bool is_searching) {
   levels_.clear();
@@ -185,7 +218,7 @@ void SymmetricGrower::split(SplitChoice choice, bool is_refined, bool is_last) {
         const auto [begin, end] = block;
         const ColumnOfRows of_block{column.cells + begin, column.values + begin, column.weights + begin};
         add_regions(sums.sums.data(), leaves_.data() + begin, of_block, residuals_.data() + begin, end - begin, window,
-                    choice.missing_left);
+                    choice.missing_left >= 0.5);
         if (window.first <= window.last) list_window(sums.in_window, column.cells, block, window);
       });
   const bool has_slope = may_have_slope(choice.feature);
@@ -202,13 +235,17 @@ void SymmetricGrower::split(SplitChoice choice, bool is_refined, bool is_last) {
   for (const RowOfWindow& row : in_window) {
     if (row.cell <= choice.cell) sums[row.leaf].left.add(row.weight, row.residual, row.z);
   }
+  if (lacked_[choice.feature]) decide(choice, sums);
   const auto found = std::ranges::find(features_, choice.feature);
   const std::ptrdiff_t slope = found - features_.begin();
   if (has_slope && found == features_.end()) features_.push_back(choice.feature);
   std::vector<SideModel> sides;
   std::vector<LeafModel> models;
   std::vector<bool> has_rows;
+  Level level{choice, {}};
   for (std::size_t leaf = 0; leaf < num_leaves; ++leaf) {
+    const bool is_shared = !lacked_[choice.feature] && sums[leaf].all.weight > 0.0;
+    level.left.push_back(is_shared ? sums[leaf].left.weight / sums[leaf].all.weight : choice.missing_left);
     for (const SideSums& side : {sums[leaf].left, sums[leaf].all - sums[leaf].left}) {
       has_rows.push_back(side.weight > 0.0);
       sides.push_back(has_rows.back() ? side_model(side, has_slope, options_.ridges) : SideModel());
@@ -219,8 +256,8 @@ void SymmetricGrower::split(SplitChoice choice, bool is_refined, bool is_last) {
   }
   models_ = std::move(models);
   has_rows_ = std::move(has_rows);
-  levels_.push_back(choice);
-  if (!is_last) move_rows(levels_.back(), sides, is_refined);
+  levels_.push_back(std::move(level));
+  if (!is_last) move_rows(choice, sides, is_refined);
 }
 
 void SymmetricGrower::move_rows(const SplitChoice& level, std::span<const SideModel> sides, bool is_packed) {
@@ -231,7 +268,7 @@ void SymmetricGrower::move_rows(const SplitChoice& level, std::span<const SideMo
     const std::size_t count = end - begin;
     // No cell has the number 65535 if missing values are not on the left side: it is on the right one.
     to_sides(leaves_.data() + begin, feature.cells.data() + first_ + begin, count,
-             static_cast<std::uint16_t>(level.cell), level.missing_left ? missing_cell : 0);
+             static_cast<std::uint16_t>(level.cell), level.missing_left >= 0.5 ? missing_cell : 0);
     subtract_sides(residuals_.data() + begin, leaves_.data() + begin, feature.values.data() + first_ + begin, count,
                    sides.data());
     if (!is_packed) return;
@@ -260,7 +297,9 @@ GrowingTree SymmetricGrower::estimate(const GrowingTree& tree, const Eigen::Vect
     const GrowingNode& node = tree[k];
     if (node.feature < 0) continue;
     depth[node.left] = depth[node.right] = depth[k] + 1;
-    if (depth[k] == choices.size()) choices.push_back({0.0, node.feature, node.cell, node.missing_left});
+    if (depth[k] < choices.size()) continue;
+    choices.push_back({0.0, node.feature, node.cell});
+    if (lacked_[node.feature]) choices.back().missing_left = node.missing_left >= 0.5 ? 1.0 : 0.0;
   }
   for (std::size_t level = 0; level < choices.size(); ++level) {
     split(choices[level], false, level + 1 == choices.size());
@@ -272,9 +311,9 @@ GrowingTree SymmetricGrower::estimate(const GrowingTree& tree, const Eigen::Vect
 // The leaves of rows from `first` on.
 void SymmetricGrower::leaves_of_rows(Eigen::Index first, std::span<std::uint8_t> leaves) const {
   std::ranges::fill(leaves, 0);
-  for (const SplitChoice& level : levels_) {
-    to_sides(leaves.data(), rows_.features[level.feature].cells.data() + first, leaves.size(),
-             static_cast<std::uint16_t>(level.cell), level.missing_left ? missing_cell : 0);
+  for (const auto& [split, left] : levels_) {
+    to_sides(leaves.data(), rows_.features[split.feature].cells.data() + first, leaves.size(),
+             static_cast<std::uint16_t>(split.cell), split.missing_left >= 0.5 ? missing_cell : 0);
   }
 }
 
@@ -292,15 +331,15 @@ int SymmetricGrower::add_node(GrowingTree& tree, std::size_t level, std::size_t 
   const auto begin = has_rows_.begin() + static_cast<std::ptrdiff_t>(first);
   if (level == levels_.size() || std::find(begin, begin + static_cast<std::ptrdiff_t>(leaves), true) ==
                                      begin + static_cast<std::ptrdiff_t>(leaves)) {
-    tree.back().model = {models_[first], features_};
+    tree.back().model = {models_[first], features_, means_[first]};
     return number;
   }
   const int left = add_node(tree, level + 1, first);
   const int right = add_node(tree, level + 1, first + leaves / 2);
   GrowingNode& node = tree[number];
-  node.feature = levels_[level].feature;
-  node.cell = levels_[level].cell;
-  node.missing_left = levels_[level].missing_left;
+  node.feature = levels_[level].split.feature;
+  node.cell = levels_[level].split.cell;
+  node.missing_left = levels_[level].left[first / leaves];
   node.left = left;
   node.right = right;
   return number;

@@ -47,10 +47,17 @@ class SymmetricGrower {
   const Eigen::Index count_;
   const TreeOptions options_;
   const int max_threads_;
+  const std::vector<bool> lacked_;  // of each feature, by rows that are learned from
+  const std::vector<int> lacking_;  // held-out rows that lack another one
   // The tree that grows.
-  std::vector<SplitChoice> levels_;
+  struct Level {
+    SplitChoice split;
+    std::vector<double> left;  // of the nodes: GrowingNode::missing_left
+  };
+  std::vector<Level> levels_;
   SlopeFeatures features_;         // with slopes, which all leaves have
   std::vector<LeafModel> models_;  // of the paths, then of the leaves
+  std::vector<Slopes> means_;      // of the leaves
   std::vector<bool> has_rows_;     // each of them
   // The rows that are searched for splits, a part of all.
   Eigen::Index first_ = 0;

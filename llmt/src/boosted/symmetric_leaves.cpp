@@ -173,12 +173,14 @@ void SymmetricGrower::fit_leaves(const Eigen::VectorXd& residuals) {
                            block);
           });
         });
+    means_.assign(models_.size(), {});
     for (std::size_t leaf = 0; leaf < models_.size(); ++leaf) {
       const RegressorSums of_leaf = regressor_sums<size>(sums, static_cast<int>(leaf), features_.size());
       LeafModel& model = models_[leaf];
       has_rows_[leaf] = of_leaf.n > 0.0;
       if (has_rows_[leaf]) {
         add_estimate(model, static_cast<int>(features_.size()), of_leaf, options_.ridges);
+        means_[leaf] = means_of(of_leaf, features_, lacked_);
       } else {
         std::tie(model.low, model.high) = range_above(sums, leaf);
       }
@@ -186,7 +188,9 @@ void SymmetricGrower::fit_leaves(const Eigen::VectorXd& residuals) {
   });
 }
 
-void SymmetricGrower::subtract_last(const GrowingTree&, double rate, Eigen::VectorXd& residuals) const {
+void SymmetricGrower::subtract_last(const GrowingTree& tree, double rate, Eigen::VectorXd& residuals) const {
+  std::vector<double> of_lacking;  // they may be on both sides of a split
+  for (const int row : lacking_) of_lacking.push_back(residuals(row) - rate * value_at(tree, rows_, row));
   with_room_for(features_.size(), [&](auto room) {
     constexpr int size = room();
     const std::array<const float*, size> columns = columns_of<size>(rows_, features_);
@@ -199,6 +203,7 @@ void SymmetricGrower::subtract_last(const GrowingTree&, double rate, Eigen::Vect
       });
     });
   });
+  for (std::size_t k = 0; k < lacking_.size(); ++k) residuals(lacking_[k]) = of_lacking[k];
 }
 
 }  // namespace llmt

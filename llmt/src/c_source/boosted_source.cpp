@@ -14,6 +14,7 @@ namespace {
 const char* const c_boosted_tables = R"(
 struct @_input {
   double centre, deviation, levels; /* levels: how many, of a category */
+  double empty; /* the level of a missing value, or -1 */
 };
 
 struct @_feature {
@@ -22,8 +23,9 @@ struct @_feature {
 };
 
 struct @_split {
-  int feature, missing_left, left, right; /* children: splits, or -1 - k for leaf k */
+  int feature, left, right; /* children: splits, or -1 - k for leaf k */
   double threshold, half_width;
+  double missing_left; /* part of a row without the feature on the left side */
 };
 
 struct @_leaf {
@@ -33,7 +35,7 @@ struct @_leaf {
 
 struct @_term {
   int feature;
-  double slope;
+  double slope, missing; /* missing: what stands in for a missing feature, times the slope */
 };
 
 struct @_root {
@@ -54,7 +56,7 @@ static double @_standardised(int input, const double *x) {
 
 static double @_feature_at(const struct @_feature *f, const double *x) {
   if (f->level >= 0) {
-    const double level = x[f->first];
+    const double level = x[f->first] == x[f->first] ? x[f->first] : @_inputs[f->first].empty;
     if (!(level >= 0.0 && level < @_inputs[f->first].levels && level == (double)(int)level)) return NAN;
     return level == (double)f->level ? 1.0 : 0.0;
   }
@@ -67,12 +69,12 @@ static double @_leaf_at(const struct @_leaf *leaf, const double *z) {
   int k;
   for (k = leaf->first_term; k < leaf->first_term + leaf->terms; ++k) {
     const double of_feature = z[@_terms[k].feature];
-    if (of_feature == of_feature) value += @_terms[k].slope * of_feature;
+    value += of_feature == of_feature ? @_terms[k].slope * of_feature : @_terms[k].missing;
   }
   return value < leaf->low ? leaf->low : leaf->high < value ? leaf->high : value;
 }
 
-/* The sides of a soft split are summed in the order of the library: all below the left one first. */
+/* The sides of a split are summed in the order of the library: all below the left one first. */
 static double @_tree(const struct @_root *root, const double *z) {
   int waiting[@_DEPTH + 1] = {0};
   double shares[@_DEPTH + 1] = {0.0};
@@ -87,7 +89,15 @@ static double @_tree(const struct @_root *root, const double *z) {
       const double value = z[s->feature];
       const double beyond = value - s->threshold;
       if (value != value) {
-        at = s->missing_left ? s->left : s->right;
+        at = s->missing_left == 1.0 ? s->left : s->right;
+        if (s->missing_left > 0.0 && s->missing_left < 1.0) {
+          waiting[count] = s->right;
+          shares[count] = share * (1.0 - s->missing_left);
+          sums[count++] = sum;
+          at = s->left;
+          share *= s->missing_left;
+          sum = 0.0;
+        }
         continue;
       }
       if ((beyond < 0.0 ? -beyond : beyond) < s->half_width) {
@@ -163,16 +173,18 @@ struct Entries {
         fmt::format("{{{}, {}}}", child(tree.splits.empty() ? -1 : 0), Tables::number(tree.smallest_share)));
     std::vector<std::string> of_tree;
     for (const BoostedSplit& split : tree.splits) {
-      of_tree.push_back(fmt::format("{{{}, {}, {}, {}, {}, {}}}", first_feature + split.feature,
-                                    split.missing_left ? 1 : 0, child(split.left), child(split.right),
-                                    Tables::number(split.threshold), Tables::number(split.half_width)));
+      of_tree.push_back(fmt::format("{{{}, {}, {}, {}, {}, {}}}", first_feature + split.feature, child(split.left),
+                                    child(split.right), Tables::number(split.threshold),
+                                    Tables::number(split.half_width), Tables::number(split.missing_left)));
     }
     splits.insert(splits.end(), of_tree.begin(), of_tree.end());
     for (const BoostedLeaf& leaf : tree.leaves) {
       leaves.push_back(fmt::format("{{{}, {}, {}, {}, {}}}", terms.size(), leaf.features.size(),
                                    Tables::number(leaf.constant), Tables::number(leaf.low), Tables::number(leaf.high)));
       for (std::size_t k = 0; k < leaf.features.size(); ++k) {
-        terms.push_back(fmt::format("{{{}, {}}}", first_feature + leaf.features[k], Tables::number(leaf.slopes[k])));
+        const double missing = leaf.means.empty() ? 0.0 : leaf.slopes[k] * leaf.means[k];
+        terms.push_back(fmt::format("{{{}, {}, {}}}", first_feature + leaf.features[k], Tables::number(leaf.slopes[k]),
+                                    Tables::number(missing)));
       }
     }
   }
@@ -204,8 +216,10 @@ CSource to_c(const BoostedModel& model, const std::string& name, const std::stri
   std::vector<std::string> inputs;
   for (std::size_t j = 0; j < model.inputs().size(); ++j) {
     const InputColumn& input = model.inputs()[j];
-    inputs.push_back(fmt::format("{{{}, {}, {}}}", Tables::number(input.centre), Tables::number(model.deviations()[j]),
-                                 Tables::number(static_cast<double>(input.levels.size()))));
+    const auto levels = static_cast<double>(input.levels.size());
+    inputs.push_back(fmt::format("{{{}, {}, {}, {}}}", Tables::number(input.centre),
+                                 Tables::number(model.deviations()[j]), Tables::number(levels),
+                                 Tables::number(input.has_empty_level() ? levels - 1.0 : -1.0)));
   }
   Tables tables(name);
   const auto add = [&](const char* what, const char* type, const std::vector<std::string>& of) {

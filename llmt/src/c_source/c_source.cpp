@@ -156,10 +156,16 @@ void add_inputs(Tables& tables, const Model& model, const std::string& name) {
 std::string predict_function(Tables& tables, const Model& model, bool gaussian) {
   std::string codes;
   for (std::size_t j = 0; j < model.inputs().size(); ++j) {
-    const std::vector<double>& of_input = model.inputs()[j].codes;
-    if (of_input.empty()) continue;
-    const std::string table = tables.add(fmt::format("codes{}", j), of_input);
-    codes += fmt::format("  x[{}] = @_position({}, {}, x[{}]);\n", j, table, of_input.size(), j);
+    const InputColumn& input = model.inputs()[j];
+    const std::vector<double>& of_input = input.codes;
+    const std::string empty =
+        input.has_empty_level() ? fmt::format("x[{0}] != x[{0}] ? {1}.0 : ", j, input.levels.size() - 1) : "";
+    if (!of_input.empty()) {
+      const std::string table = tables.add(fmt::format("codes{}", j), of_input);
+      codes += fmt::format("  x[{0}] = {3}@_position({1}, {2}, x[{0}]);\n", j, table, of_input.size(), empty);
+    } else if (!empty.empty()) {
+      codes += fmt::format("  x[{0}] = {1}x[{0}];\n", j, empty);
+    }
   }
   return fmt::format(R"(
 int @_predict(const double *inputs, double *outputs) {{

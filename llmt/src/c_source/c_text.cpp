@@ -85,9 +85,12 @@ std::string head_comment(const std::string& kind, const std::vector<InputColumn>
     const InputColumn& input = inputs[j];
     text += fmt::format("   inputs[{}]: {}", j, commented(input.name));
     for (std::size_t level = 0; level < input.levels.size(); ++level) {
+      const bool is_empty = input.levels[level].empty() && level + 1 == input.levels.size();
       text += fmt::format("{} {} = {}", level == 0 ? "," : ";",
-                          input.codes.empty() ? std::to_string(level) : fmt::format("{}", input.codes[level]),
-                          commented(input.levels[level]));
+                          is_empty              ? "NaN"
+                          : input.codes.empty() ? std::to_string(level)
+                                                : fmt::format("{}", input.codes[level]),
+                          is_empty ? "no value" : commented(input.levels[level]));
     }
     text += "\n";
   }

@@ -239,13 +239,13 @@ ComparisonResult compare_rows(GivenRows given, const std::vector<Method>& method
 }  // namespace
 
 ComparisonResult compare(const TrainingData& data, const std::vector<Method>& methods, const CompareOptions& options) {
-  return compare_rows(given_rows(data), methods, options);
+  return compare_rows(settled(given_rows(data), 1), methods, options);
 }
 
 ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                          const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods,
                          const CompareOptions& options) {
-  return compare_rows({.inputs = {inputs}, .outputs = {output}}, methods, options);
+  return compare_rows(settled({.inputs = {inputs}, .outputs = {output}}, 1), methods, options);
 }
 
 }  // namespace llmt

@@ -10,6 +10,20 @@
 #include <limits>
 #include <utility>
 
+#include "llmt/csv.hpp"
+
+namespace llmt {
+
+bool says_missing(std::string_view text) {
+  constexpr std::array<std::string_view, 6> marks = {"", "na", "n/a", "nan", "null", "?"};
+  const auto same = [](char c, char mark) { return c == mark || (c >= 'A' && c <= 'Z' && c - 'A' + 'a' == mark); };
+  return std::ranges::any_of(marks, [&](std::string_view mark) {
+    return std::equal(text.begin(), text.end(), mark.begin(), mark.end(), same);
+  });
+}
+
+}  // namespace llmt
+
 namespace llmt::csv {
 namespace {
 
@@ -28,15 +42,6 @@ std::string_view without_quotes(std::string_view field) {
 
 // Without outer blanks, quotes, and blanks inside them.
 std::string_view bare(std::string_view field) { return trimmed(without_quotes(trimmed(field))); }
-
-// Whether a bare field says that there is no value.
-bool is_missing(std::string_view text) {
-  constexpr std::array<std::string_view, 6> marks = {"", "na", "n/a", "nan", "null", "?"};
-  const auto same = [](char c, char mark) { return c == mark || (c >= 'A' && c <= 'Z' && c - 'A' + 'a' == mark); };
-  return std::ranges::any_of(marks, [&](std::string_view mark) {
-    return std::equal(text.begin(), text.end(), mark.begin(), mark.end(), same);
-  });
-}
 
 // End of the number at `begin`, null if there is none. A leading plus is accepted, leading white space is not. A number
 // out of range is no error: too large reads as infinity, too small as zero. All three are handled here because versions
@@ -214,7 +219,6 @@ std::string unquoted(std::string_view field) {
 
 std::string_view cell_text(std::string_view field, std::string& buffer) {
   const std::string_view text = bare(field);
-  if (is_missing(text)) return {};
   if (text.find('"') == std::string_view::npos) return text;
   buffer = unquoted(field);
   return trimmed(buffer);
@@ -239,7 +243,7 @@ Cell read_cell(const char*& cursor, const char* end, char separator, const Numbe
   const char* const field = std::exchange(cursor, field_end(begin, end, separator));
   const std::string_view text = bare(std::string_view(field, cursor - field));
   if (text.empty()) return Cell::missing;
-  if (is_missing(text)) return Cell::marked;
+  if (says_missing(text)) return Cell::marked;
   if (numbers.thousands && is_number_with_thousands(text, mark, value)) return Cell::number;
   if (!is_number(text, mark, value)) {
     if (is_number_with_other_mark(text, mark)) return Cell::other_mark;

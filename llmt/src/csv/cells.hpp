@@ -48,8 +48,8 @@ bool is_blank(std::string_view text);
 /// A field as text: outer blanks and quotes taken off, doubled quotes halved.
 std::string unquoted(std::string_view field);
 
-/// The text of a cell as unquoted() has it, also without outer blanks inside the quotes; empty if the cell says that
-/// there is no value. The result refers to `field`, or to `buffer` if doubled quotes were halved.
+/// The text of a cell as unquoted() has it, also without outer blanks inside the quotes. The result refers to `field`,
+/// or to `buffer` if doubled quotes were halved.
 std::string_view cell_text(std::string_view field, std::string& buffer);
 
 /// How a table writes numbers: the decimal mark, and whether they may have separators of thousands.

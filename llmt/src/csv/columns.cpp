@@ -55,11 +55,15 @@ void count_cell(ColumnCells& cells, csv::Cell cell, Eigen::Index row) {
   if (cell == csv::Cell::infinite) ++cells.infinite;
   if (cell == csv::Cell::other_mark) ++cells.other_mark;
   if (cell == csv::Cell::thousands) ++cells.thousands;
-  if (cell == csv::Cell::marked) cells.first_marked = std::min(cells.first_marked, row);
+  if (cell == csv::Cell::marked) {
+    ++cells.marked;
+    cells.first_marked = std::min(cells.first_marked, row);
+  }
 }
 
 void add(ColumnCells& sum, const ColumnCells& part) {
   sum.missing += part.missing;
+  sum.marked += part.marked;
   sum.other += part.other;
   sum.infinite += part.infinite;
   sum.other_mark += part.other_mark;
@@ -197,8 +201,9 @@ void Csv::visit_texts(std::span<const std::string> columns,
 std::vector<std::string> Csv::texts(const std::string& column) const {
   std::vector<std::string> result;
   result.reserve(row_begins_.size());
-  visit_texts(std::span<const std::string>(&column, 1),
-              [&](Eigen::Index, std::size_t, std::string_view text) { result.emplace_back(text); });
+  visit_texts(std::span<const std::string>(&column, 1), [&](Eigen::Index, std::size_t, std::string_view text) {
+    result.emplace_back(says_missing(text) ? std::string_view() : text);
+  });
   return result;
 }
 

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -16,16 +17,15 @@
 namespace llmt {
 namespace {
 
-// Rows that meet others with equal inputs are of one measurement if they are at most this many on average. More of them
-// are cells of a table of few values.
-constexpr double most_repeats = 10.0;
+// Rows are repeats if at most this part of them has inputs that no other row has. Copies among many other rows come
+// with new rows as often as with held-out ones.
+constexpr double most_alone = 0.5;
 
-// Rows with equal inputs are repeats only if there are at least 1 + this of them on average. If there are fewer, new
-// rows will have an equal one as often as held-out rows do.
-constexpr double fewest_repeats = 0.2;
-
-// Part of the rows that meet in half of the inputs and in all of them.
+// Rows are repeats if of those that meet in half of the inputs this part meets in the others too, beyond chance.
 constexpr double part_that_meets = 0.5;
+
+// Part of the variance of the numbers of equal rows that rows drawn at random would have.
+constexpr double part_of_scatter = 0.5;
 
 // Repeats and copies are looked for where there are at least this number of different rows: few rows may be there twice
 // by chance, and can hardly be dealt to folds.
@@ -65,23 +65,55 @@ std::vector<int> all_columns(const Eigen::Ref<const Eigen::MatrixXd>& table) {
   return columns;
 }
 
-// Every second column from `first` on.
-std::vector<int> every_second(int first, Eigen::Index columns) {
+// Every second one of the columns from the place `first` on.
+std::vector<int> every_second(const std::vector<int>& columns, std::size_t first) {
   std::vector<int> result;
-  for (int j = first; j < columns; j += 2) result.push_back(j);
+  for (std::size_t at = first; at < columns.size(); at += 2) result.push_back(columns[at]);
   return result;
 }
 
-// The rule (C.2).
+// Whether the kinds of rows have more even numbers of rows than if rows had been drawn at random from kinds that are
+// equally frequent: those numbers have a Poisson distribution, of which the kinds without a row are not seen.
+bool are_even(const std::vector<int>& numbers) {
+  const std::vector<int> sizes = sizes_of(numbers);
+  const double kinds = static_cast<double>(sizes.size());
+  const double mean = static_cast<double>(numbers.size()) / kinds;
+  double squares = 0.0;
+  for (const int size : sizes) squares += (size - mean) * (size - mean);
+  // The rate of the Poisson distribution whose mean without zeros is `mean`: the fixed point lies between mean - 1 and
+  // mean.
+  double rate = mean;
+  for (int step = 0; step < 200; ++step) rate = mean * -std::expm1(-rate);
+  return squares / (kinds - 1.0) < part_of_scatter * mean * (1.0 + rate - mean);
+}
+
+// The rule (C.2): whether rows that agree in some columns are repeats.
 bool are_repeats(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<Eigen::Index>& rows,
-                 const std::vector<int>& by_inputs) {
-  const double size = mean_size(by_inputs);
-  if (size < 1.0 + fewest_repeats || size > most_repeats) return false;
-  if (inputs.cols() == 1) return true;
-  const auto size_by = [&](int first) {
-    return mean_size(number_different_rows(inputs, rows, every_second(first, inputs.cols())));
+                 const std::vector<int>& columns, const std::vector<int>& numbers) {
+  const std::vector<int> sizes = sizes_of(numbers);
+  const auto alone = static_cast<double>(std::ranges::count(sizes, 1));
+  if (count_of(sizes) < fewest_different || alone > most_alone * static_cast<double>(rows.size())) return false;
+  if (are_even(numbers)) return true;
+  if (columns.size() < 2) return false;
+  // Of the other rows, the parts that agree with a row in a half of the inputs, or in all.
+  const auto part = [&](const std::vector<int>& by) {
+    return (mean_size(by) - 1.0) / (static_cast<double>(rows.size()) - 1.0);
   };
-  return size - 1.0 >= part_that_meets * (std::min(size_by(0), size_by(1)) - 1.0);
+  const double first = part(number_different_rows(inputs, rows, every_second(columns, 0)));
+  const double second = part(number_different_rows(inputs, rows, every_second(columns, 1)));
+  const double by_chance = std::max(first, second);
+  return part(numbers) / std::min(first, second) - by_chance >= part_that_meets * (1.0 - by_chance);
+}
+
+// Whether a column grows from each row to the next, or falls, as a time stamp or a counter does.
+bool is_running(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<Eigen::Index>& rows, int column) {
+  const auto every_step = [&](const auto& compare) {
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+      if (!compare(inputs(rows[i - 1], column), inputs(rows[i], column))) return false;
+    }
+    return true;
+  };
+  return every_step(std::less<>()) || every_step(std::greater<>());
 }
 
 // The number of times that a table was written one after the other: the greatest common divisor of the numbers of equal
@@ -105,6 +137,12 @@ std::vector<int> copies(const std::vector<int>& by_all, int times) {
     copy_of[i] = left[number][seen[number]++ % stay];
   }
   return copy_of;
+}
+
+std::vector<Eigen::Index> at_places(const std::vector<Eigen::Index>& rows, const std::vector<Eigen::Index>& places) {
+  std::vector<Eigen::Index> result;
+  for (const Eigen::Index place : places) result.push_back(rows[place]);
+  return result;
 }
 
 // The numbers at some positions, in order of first appearance there.
@@ -176,48 +214,66 @@ RowNumbers number_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                        const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows,
                        int max_threads) {
   ++times_numbered;
+  const std::vector<int> all = all_columns(inputs);
+  const auto have_twins = [&](const std::vector<int>& numbers) { return different(numbers) < count_of(rows); };
   RowNumbers numbers;
-  std::vector<int> by_inputs = number_different_rows(inputs, rows, all_columns(inputs), max_threads);
-  if (different(by_inputs) == count_of(rows)) return numbers;
-  numbers.by_all = pairs_of(by_inputs, number_different_rows(outputs, rows, all_columns(outputs)));
-  numbers.by_inputs = std::move(by_inputs);
+  for (const int column : all) {
+    if (!is_running(inputs, rows, column)) numbers.setting_columns.push_back(column);
+  }
+  if (!numbers.setting_columns.empty() && numbers.setting_columns.size() < all.size()) {
+    numbers.by_setting = number_different_rows(inputs, rows, numbers.setting_columns, max_threads);
+  }
+  // Rows that differ in some columns differ in all.
+  if (!numbers.by_setting.empty() && !have_twins(numbers.by_setting)) return {};
+  std::vector<int> by_inputs = number_different_rows(inputs, rows, all, max_threads);
+  if (have_twins(by_inputs)) {
+    numbers.by_all = pairs_of(by_inputs, number_different_rows(outputs, rows, all_columns(outputs)));
+    numbers.by_inputs = std::move(by_inputs);
+  }
   return numbers;
 }
 
 long times_rows_were_numbered() { return times_numbered; }
 
 RowNumbers at(const RowNumbers& numbers, const std::vector<Eigen::Index>& positions) {
-  if (numbers.by_inputs.empty()) {
-    if (std::ranges::adjacent_find(positions) == positions.end()) return {};
-    std::vector<int> own;
+  RowNumbers result{.setting_columns = numbers.setting_columns};
+  if (!numbers.by_setting.empty()) result.by_setting = renumbered(numbers.by_setting, positions);
+  if (!numbers.by_inputs.empty()) {
+    result.by_inputs = renumbered(numbers.by_inputs, positions);
+    result.by_all = renumbered(numbers.by_all, positions);
+  } else if (std::ranges::adjacent_find(positions) != positions.end()) {
     for (std::size_t i = 0; i < positions.size(); ++i) {
-      own.push_back(i == 0 ? 0 : own.back() + (positions[i] != positions[i - 1] ? 1 : 0));
+      const bool same = i > 0 && positions[i] == positions[i - 1];
+      result.by_inputs.push_back(i == 0 ? 0 : result.by_inputs.back() + (same ? 0 : 1));
     }
-    return {own, own};
+    result.by_all = result.by_inputs;
   }
-  return {renumbered(numbers.by_inputs, positions), renumbered(numbers.by_all, positions)};
+  return result;
 }
 
 EqualRows find_equal_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<Eigen::Index>& rows,
                           const RowNumbers& numbers) {
-  if (numbers.by_inputs.empty()) return {};
-  const int cells = different(numbers.by_inputs);
-  if (cells == count_of(rows) || cells < fewest_different) return {};
-  const int times = times_written(numbers.by_all);
-  std::vector<int> copy_of = copies(numbers.by_all, times);
-  std::vector<Eigen::Index> left;  // rows of the table written once
-  std::vector<int> left_by_inputs;
-  for (int i = 0; i < count_of(rows); ++i) {
-    if (copy_of[i] != i) continue;
-    left.push_back(rows[i]);
-    left_by_inputs.push_back(numbers.by_inputs[i]);
-  }
   EqualRows result;
-  result.are_repeats = cells < count_of(left) && are_repeats(inputs, left, left_by_inputs);
-  if (result.are_repeats) {
-    result.copy_of = copies(numbers.by_all, std::numeric_limits<int>::max());
-    result.group = numbers.by_inputs;
-  } else if (times > 1) {
+  std::vector<int> all_alone(rows.size());
+  std::iota(all_alone.begin(), all_alone.end(), 0);
+  const std::vector<int>& by_all = numbers.by_all.empty() ? all_alone : numbers.by_all;
+  // The table written once.
+  const int times = times_written(by_all);
+  std::vector<int> copy_of = copies(by_all, times);
+  std::vector<Eigen::Index> left;
+  for (int i = 0; i < count_of(rows); ++i) {
+    if (copy_of[i] == i) left.push_back(i);
+  }
+  const std::vector<Eigen::Index> rows_left = at_places(rows, left);
+  const auto repeat = [&](const std::vector<int>& by, const std::vector<int>& columns) {
+    return !by.empty() && are_repeats(inputs, rows_left, columns, renumbered(by, left));
+  };
+  const bool in_all = repeat(numbers.by_inputs, all_columns(inputs));
+  if (in_all || repeat(numbers.by_setting, numbers.setting_columns)) {
+    result.are_repeats = true;
+    result.group = in_all ? numbers.by_inputs : numbers.by_setting;
+    result.copy_of = copies(by_all, std::numeric_limits<int>::max());
+  } else if (times > 1 && different(by_all) >= fewest_different) {
     result.group = copy_of;
     result.copy_of = std::move(copy_of);
   }

@@ -15,8 +15,12 @@ std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& 
 
 /// Which rows of a table are equal: rows with equal numbers have equal inputs, or equal inputs and outputs.
 struct RowNumbers {
-  std::vector<int> by_inputs;  ///< empty: no two rows have equal inputs
-  std::vector<int> by_all;
+  std::vector<int> by_inputs = {};  ///< empty: no two rows have equal inputs
+  std::vector<int> by_all = {};
+  /// By the inputs that do not run, as a time stamp or a counter does, which grows from each row to the next or falls.
+  /// Empty: no input runs, or all do, or no two rows are equal in the others.
+  std::vector<int> by_setting = {};
+  std::vector<int> setting_columns = {};  ///< the inputs that do not run
 };
 
 /// The numbers of the given rows. All rows are hashed and sorted, so a fit asks once (times_rows_were_numbered()).
@@ -34,9 +38,9 @@ RowNumbers at(const RowNumbers& numbers, const std::vector<Eigen::Index>& positi
 struct EqualRows {
   bool are_repeats = false;  ///< rows with equal inputs are repeats of one measurement
   /// A number for each row; rows with the same number must share a fold. Empty: every row stands alone.
-  std::vector<int> group;
+  std::vector<int> group = {};
   /// For each row the position among `rows` of the row that it copies, or its own. Empty: there are no copies.
-  std::vector<int> copy_of;
+  std::vector<int> copy_of = {};
 };
 
 /// `numbers`: of `rows`, which are rows of `inputs`.

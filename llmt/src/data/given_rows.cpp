@@ -84,16 +84,52 @@ std::vector<bool> held_out_of(const TrainingData& data) {
   return held_out;
 }
 
+// The level that missing values of a categorical input have: behind those with names, or behind those that occur.
+std::size_t empty_level_of(const TrainingData& data, int input) {
+  if (!data.levels.empty() && !data.levels[input].empty()) {
+    const std::vector<std::string>& names = data.levels[input];
+    return names.size() - (names.back().empty() ? 1 : 0);
+  }
+  double highest = -1.0;
+  for (const double value : data.inputs.col(input)) highest = std::max(highest, std::isnan(value) ? -1.0 : value);
+  return static_cast<std::size_t>(highest + 1.0);
+}
+
+// The inputs with a level of its own for missing values of categorical ones: that nothing is there may say something.
+// Sets GivenRows::empty_levels.
+SharedMatrix with_empty_levels(const TrainingData& data, std::vector<int> categorical,
+                               std::vector<std::size_t>& empty_levels) {
+  std::erase_if(categorical, [&](int input) {
+    const auto column = data.inputs.col(input).array();
+    return !column.isNaN().any() || column.isNaN().all();
+  });
+  if (categorical.empty()) return {data.inputs};
+  empty_levels.resize(data.inputs.cols(), 0);
+  Eigen::MatrixXd inputs = data.inputs;
+  for (const int input : categorical) {
+    const std::size_t level = empty_level_of(data, input);
+    empty_levels[input] = level + 1;
+    for (double& value : inputs.col(input)) {
+      if (std::isnan(value)) value = static_cast<double>(level);
+    }
+  }
+  return shared(std::move(inputs));
+}
+
 }  // namespace
 
 GivenRows given_rows(const TrainingData& data) {
   check_names(data);
-  return {.inputs = {data.inputs},
+  std::vector<int> categorical = categorical_of(data);
+  std::vector<std::size_t> empty_levels;
+  SharedMatrix inputs = with_empty_levels(data, categorical, empty_levels);
+  return {.inputs = std::move(inputs),
           .outputs = {data.outputs},
           .weights = data.weights,
           .groups = data.groups,
           .held_out = held_out_of(data),
-          .categorical = categorical_of(data),
+          .categorical = std::move(categorical),
+          .empty_levels = std::move(empty_levels),
           .may_have_codes = data.may_have_codes};
 }
 

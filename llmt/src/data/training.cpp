@@ -11,6 +11,7 @@
 
 #include "base/count.hpp"
 #include "data/make_table.hpp"
+#include "data/rounding.hpp"
 
 namespace llmt {
 namespace {
@@ -106,6 +107,20 @@ bool are_counts(const Eigen::VectorXd& weights) {
          weights.sum() <= most_counts * static_cast<double>(positive);
 }
 
+// A view cannot be made to view something else, so the rows are put together anew.
+GivenRows with_inputs(GivenRows given, SharedMatrix inputs) {
+  return {.inputs = std::move(inputs),
+          .outputs = given.outputs,
+          .weights = std::move(given.weights),
+          .groups = std::move(given.groups),
+          .held_out = std::move(given.held_out),
+          .are_counts = given.are_counts,
+          .categorical = std::move(given.categorical),
+          .may_have_codes = given.may_have_codes,
+          .loss_weights = std::move(given.loss_weights),
+          .numbers = std::move(given.numbers)};
+}
+
 void check_groups(const std::vector<double>& groups, Eigen::Index rows) {
   if (groups.empty()) return;
   if (std::ssize(groups) != rows) {
@@ -145,17 +160,26 @@ SharedMatrix shared(Eigen::MatrixXd matrix) {
   return {*owned, owned};
 }
 
-GivenRows checked(GivenRows given, const FitOptions& options) {
-  const Eigen::Ref<const Eigen::MatrixXd>& inputs = given.inputs.values;
-  const Eigen::Ref<const Eigen::MatrixXd>& outputs = given.outputs.values;
-  check_data(inputs, outputs, given.weights, given.categorical, options);
-  check_groups(given.groups, inputs.rows());
-  given.are_counts = are_counts(given.weights);
-  check_held_out(given, options);
+GivenRows settled(GivenRows given, int max_threads) {
+  std::vector<Eigen::Index> learned;
+  for (Eigen::Index row = 0; row < given.inputs.values.rows(); ++row) {
+    if (given.held_out.empty() || !given.held_out[row]) learned.push_back(row);
+  }
+  std::optional<Eigen::MatrixXd> inputs = without_rounding(given.inputs.values, learned, max_threads);
+  if (!inputs) return given;
+  return with_inputs(std::move(given), shared(*std::move(inputs)));
+}
+
+GivenRows checked(GivenRows rows, const FitOptions& options) {
+  check_data(rows.inputs.values, rows.outputs.values, rows.weights, rows.categorical, options);
+  check_groups(rows.groups, rows.inputs.values.rows());
+  rows.are_counts = are_counts(rows.weights);
+  check_held_out(rows, options);
+  GivenRows given = settled(std::move(rows), options.max_threads);
   if (!given.numbers && given.groups.empty() && options.folds.count > 0) {
-    std::vector<Eigen::Index> all(inputs.rows());
+    std::vector<Eigen::Index> all(given.inputs.values.rows());
     std::iota(all.begin(), all.end(), 0);
-    given.numbers = number_rows(inputs, outputs, all, options.max_threads);
+    given.numbers = number_rows(given.inputs.values, given.outputs.values, all, options.max_threads);
   }
   return given;
 }
@@ -168,6 +192,7 @@ GivenRows rows_at(const GivenRows& given, const std::vector<Eigen::Index>& rows)
           .held_out = values_at(given.held_out, rows),
           .are_counts = given.are_counts,
           .categorical = given.categorical,
+          .empty_levels = given.empty_levels,
           .may_have_codes = given.may_have_codes,
           .loss_weights = values_at(given.loss_weights, rows),
           .numbers = numbers_at(given, rows)};
@@ -218,6 +243,9 @@ KeptRows keep(const GivenRows& given, const FoldOptions& folds) {
   }
   if (equal.are_repeats) {
     for (const Eigen::Index position : without.left) kept.groups.push_back(equal.group[position]);
+    kept.kind = values_at(equal.group, without.left);
+  } else if (given.numbers) {
+    kept.kind = values_at(at(*given.numbers, counted).by_inputs, without.left);
   }
   if (!given.groups.empty()) kept.groups = values_at(given.groups, rows);
   for (std::size_t i = 0; i < counted.size(); ++i) {

@@ -37,15 +37,21 @@ struct GivenRows {
   /// True if weights are counts: a row of weight k is k equal rows (docs/algorithms/data.md, "Row weights"). Set by
   /// checked().
   bool are_counts = false;
-  std::vector<int> categorical = {};       ///< inputs whose values are categories 0, 1, 2, ...
+  std::vector<int> categorical = {};  ///< inputs whose values are categories 0, 1, 2, ...
+  /// Of each input whose last category is that of its missing values, the number of categories; of others 0. May be
+  /// empty: all 0.
+  std::vector<std::size_t> empty_levels = {};
   bool may_have_codes = true;              ///< as TrainingData
   Eigen::VectorXd loss_weights = {};       ///< in training, not in errors, a row's weight is times this. Empty: all 1
   std::optional<RowNumbers> numbers = {};  ///< which rows are equal; none: nobody has looked
 };
 
-/// Checks the rows, decides whether weights are counts, and looks for equal ones where that is not yet done and makes a
-/// difference: where rows are held out and there are no groups. Throws std::invalid_argument as fit().
-GivenRows checked(GivenRows given, const FitOptions& options);
+/// The rows with inputs made the same that are equal up to rounding, without_rounding(), but for those held out.
+GivenRows settled(GivenRows given, int max_threads);
+
+/// Checks and settles the rows, decides whether weights are counts, and looks for equal ones where that is not yet done
+/// and makes a difference: where rows are held out and there are no groups. Throws std::invalid_argument as fit().
+GivenRows checked(GivenRows rows, const FitOptions& options);
 
 /// The numbers of some of the rows, if these have any.
 std::optional<RowNumbers> numbers_at(const GivenRows& given, const std::vector<Eigen::Index>& rows);
@@ -79,6 +85,7 @@ struct KeptRows {
   std::vector<Fold> folds = {};         ///< selection_folds(), or that of GivenRows::held_out
   Eigen::Index copies = 0;              ///< the number of given rows that are copies of others
   bool has_repeats = false;             ///< whether rows with equal inputs are repeats
+  std::vector<int> kind = {};           ///< equal numbers for equal inputs; empty: all differ, or nobody has looked
   bool is_fold_given = false;           ///< the model is fitted to the rows that the only fold does not hold out
 
   Eigen::Index count() const { return weights.size(); }

@@ -30,13 +30,15 @@ void set_categories(TrainingData& data, int input, std::span<const std::string> 
 }
 
 Eigen::VectorXd category_values(std::span<const std::string> words, std::span<const std::string> levels) {
+  constexpr double unknown = -1.0;
   std::map<std::string_view, double> places;
   for (const std::string& level : levels) places.emplace(level, static_cast<double>(places.size()));
   Eigen::VectorXd values(std::ssize(words));
   for (std::size_t row = 0; row < words.size(); ++row) {
     const auto found = places.find(words[row]);
-    values(static_cast<Eigen::Index>(row)) =
-        found == places.end() ? std::numeric_limits<double>::quiet_NaN() : found->second;
+    values(static_cast<Eigen::Index>(row)) = found != places.end() ? found->second
+                                             : words[row].empty()  ? std::numeric_limits<double>::quiet_NaN()
+                                                                   : unknown;
   }
   return values;
 }

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "estimation/estimate.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "numerics/gram.hpp"
+#include "partition/tree.hpp"
 #include "stream/sums.hpp"
 
 namespace llmt::distributed {
@@ -165,7 +165,7 @@ Model assemble(const StateData& data) {
     if (from.fate != Fate::inner) continue;
     partition.nodes[at].samples = partition.nodes[from.left].samples + partition.nodes[from.right].samples;
   }
-  partition.outer_slope = agreed_slope(partition);
+  partition.outer_slope = agreed_slope(partition, partition.num_leaves());
   if (data.root_residual.low <= data.root_residual.high) {
     partition.residual_range = Eigen::RowVector2d(data.root_residual.low, data.root_residual.high);
   }

@@ -10,34 +10,11 @@
 namespace llmt {
 namespace {
 
-// Number of first leaves whose slopes decide how far the root's slope is extrapolated (B.4).
-constexpr Eigen::Index leaves_that_agree = 32;
-
 // Rows for each unknown of the sample from which a joint estimate on many rows starts. It is used where there are more
 // than twice as many rows.
 constexpr Eigen::Index first_sample_rows_per_unknown = 50;
 
 }  // namespace
-
-Eigen::MatrixXd agreed_slope(const Partition& grown) {
-  const Partition first = prefix(grown, leaves_that_agree);
-  const Node& root = first.nodes.front();
-  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(root.slope.rows(), root.slope.cols());
-  for (const Node& node : first.nodes) {
-    if (node.is_leaf()) {
-      spread +=
-          static_cast<double>(node.samples) / static_cast<double>(root.samples) * (node.slope - root.slope).cwiseAbs2();
-    }
-  }
-  Eigen::MatrixXd slope = root.slope;
-  for (Eigen::Index o = 0; o < spread.rows(); ++o) {
-    for (Eigen::Index k = 0; k < spread.cols(); ++k) {
-      const double squared = root.slope(o, k) * root.slope(o, k);
-      slope(o, k) *= squared > spread(o, k) ? 1.0 - spread(o, k) / squared : 0.0;
-    }
-  }
-  return slope;
-}
 
 Partition blended(const TrainingRows& training, const GrownTree& grown, const Validity& validity, double jump) {
   Partition partition = grown.partition;
@@ -52,10 +29,7 @@ Partition blended(const TrainingRows& training, const GrownTree& grown, const Va
 
 Partition estimate(const TrainingRows& training, const GrownTree& grown, const Candidate& candidate, int max_threads,
                    Work& work) {
-  Partition partition = prefix(blended(training, grown, candidate.validity, candidate.jump), candidate.leaves);
-  if (candidate.leaves == 1) {
-    partition.outer_slope.resize(0, 0);  // one linear model goes on with its own slopes
-  }
+  Partition partition = grown_prefix(blended(training, grown, candidate.validity, candidate.jump), candidate.leaves);
   const Eigen::Index enough = first_sample_rows_per_unknown * candidate.leaves * (std::ssize(training.regressors) + 1);
   const bool is_crisp = candidate.validity.kind == ValidityKind::crisp;
   if (!is_crisp && candidate.estimation == Estimation::joint) {

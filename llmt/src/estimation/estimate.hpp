@@ -16,10 +16,6 @@ struct GrownTree {
   Eigen::VectorXd jumps;  ///< of every node, see jump_sizes()
 };
 
-/// Partition::outer_slope of a grown tree, eq. (B.4) of docs/algorithms/guards.md: the root's slope, shrunk by the mean
-/// square spread of the first leaves' slopes about it, as in a James-Stein estimate.
-Eigen::MatrixXd agreed_slope(const Partition& grown);
-
 /// The tree with the half widths (V.3) of a validity. Splits with a jump of at least `jump` stay crisp.
 Partition blended(const TrainingRows& training, const GrownTree& grown, const Validity& validity, double jump);
 

@@ -83,7 +83,7 @@ Partition local(const LeafSums& sums, Eigen::Index leaves, double shrinkage, boo
 }
 
 Partition as_grown(const LeafSums& sums, Eigen::Index leaves) {
-  Partition result = prefix(sums.partition, leaves);
+  Partition result = grown_prefix(sums.partition, leaves);
   if (!has_ordered_leaves(sums)) return result;
   std::vector<Eigen::MatrixXd> models;
   for (const Node& node : result.nodes) {

@@ -1,6 +1,9 @@
 #include "estimation/squared_errors.hpp"
 
+#include <algorithm>
+
 #include "partition/evaluator.hpp"
+#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {
@@ -33,25 +36,44 @@ Partition side_by_side(const std::vector<Partition>& partitions) {
 
 }  // namespace
 
-Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
+Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Partition& grown, const TrainingRows& rows,
                                       const Eigen::VectorXd& weights, int max_threads) {
   const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
+  // Outer slopes of the trees with 1, 2, ... leaves; larger trees have that of the last.
+  std::vector<Eigen::MatrixXd> outer_slopes = {partition.nodes.front().slope};
+  for (Eigen::Index leaves = 2; leaves <= std::min(leaves_that_agree, partition.num_leaves()); ++leaves) {
+    outer_slopes.push_back(agreed_slope(grown, leaves));
+  }
   // By how much the sum changes from M - 1 to M leaves.
   Eigen::VectorXd zero = Eigen::VectorXd::Zero(partition.num_leaves());
   const auto add = [&](const Chunk& chunk, Eigen::VectorXd& changes) {
     Eigen::VectorXd values(std::ssize(partition.outputs));
+    Eigen::VectorXd beyond(std::ssize(rows.regressors));
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
       const double* deviations = chunk.deviations.row(row).data();
       double previous = 0.0;
-      for (int node = 0; node >= 0;) {
-        evaluator.local(node, deviations, values.data());
-        evaluator.finish(deviations, values.data());
+      const auto change = [&](Eigen::Index place, const auto& prediction) {
         const double squared =
-            chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
-        // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
-        changes((node + 1) / 2) += squared - previous;
+            chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - prediction).cwiseAbs2());
+        changes(place) += squared - previous;
         previous = squared;
-        node = partition.nodes[node].is_leaf() ? -1 : evaluator.child_of(node, chunk.inputs.row(row).data());
+      };
+      // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
+      for (int node = 0; node >= 0;) {
+        const int next = partition.nodes[node].is_leaf() ? -1 : evaluator.child_of(node, chunk.inputs.row(row).data());
+        evaluator.local(node, deviations, values.data());
+        Eigen::Index place = (node + 1) / 2;
+        if (evaluator.hold(deviations, values.data())) {
+          change(place, values);
+        } else {
+          // Every further leaf changes the outer slope too, until the slopes of enough leaves agree.
+          evaluator.beyond(deviations, beyond.data());
+          const Eigen::Index last = std::ssize(outer_slopes) - 1;
+          change(place, values + outer_slopes[std::min(place, last)] * beyond);
+          const Eigen::Index end = next < 0 ? last + 1 : std::min<Eigen::Index>(last + 1, (next + 1) / 2);
+          for (++place; place < end; ++place) change(place, values + outer_slopes[place] * beyond);
+        }
+        node = next;
       }
     }
   };

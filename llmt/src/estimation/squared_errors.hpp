@@ -10,8 +10,9 @@
 namespace llmt {
 
 /// Sums of the weighted squared errors, over some rows, of the prefixes of `partition` with 1, 2, ..., num_leaves
-/// leaves, crisp and with the models that the nodes have. `weights`: of the outputs' squared errors.
-Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
+/// leaves, crisp and with the models that the nodes have, each with the outer slope that it has as a candidate of its
+/// own, see grown_prefix(). `grown`: the same tree with the models as grown. `weights`: of the outputs' squared errors.
+Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Partition& grown, const TrainingRows& rows,
                                       const Eigen::VectorXd& weights, int max_threads);
 
 /// Parts of the rows of which squared errors are told apart: their scatter shows how certain a difference is.

@@ -52,6 +52,7 @@ void check_point(const char* argument, const Model& model, const Eigen::Ref<cons
 Eigen::VectorXd reference_point(const Model& model) {
   Eigen::VectorXd reference(model.num_inputs());
   std::transform(model.inputs().begin(), model.inputs().end(), reference.begin(), [](const InputColumn& input) {
+    if (input.has_empty_level() && input.codes.empty()) return no_level;
     return input.is_categorical() ? std::numeric_limits<double>::quiet_NaN() : input.centre;
   });
   return reference;

@@ -11,8 +11,10 @@
 namespace llmt {
 namespace {
 
-// In linear terms a missing value counts as z = 0.
-double in_terms(double z) { return std::isnan(z) ? 0.0 : z; }
+// In the k-th term of a leaf the mean of the feature stands in for a missing value.
+double in_term(const BoostedLeaf& leaf, std::size_t k, double z) {
+  return !std::isnan(z) ? z : leaf.means.empty() ? 0.0 : leaf.means[k];
+}
 
 // Whether a value lies within the transition of a split.
 bool is_within(const BoostedSplit& split, double z) { return std::abs(z - split.threshold) < split.half_width; }
@@ -105,7 +107,7 @@ TwoRows::Range TwoRows::range_of(double share) const {
 
 // How much of what comes to a split goes to the right. Where that depends on inputs that are open, nothing.
 std::optional<double> TwoRows::right_of(const BoostedSplit& split, double z, double share) const {
-  if (std::isnan(z)) return split.missing_left ? 0.0 : 1.0;
+  if (std::isnan(z)) return 1.0 - split.missing_left;
   const double crisp = z <= split.threshold ? 0.0 : 1.0;
   if (!is_within(split, z)) return crisp;
   const double right = share_of_right(z, split.threshold, split.half_width);
@@ -287,13 +289,13 @@ int TwoRows::deciding_input(const BoostedLeaf& leaf, double& value) {
     const auto& [is, of] = features_[feature];
     const int open = first_open(is);
     if (open < 0) {
-      value += leaf.slopes[k] * in_terms(this->value(feature));
+      value += leaf.slopes[k] * in_term(leaf, k, this->value(feature));
       continue;
     }
     if (is.second < 0) {
-      const double from = in_terms(of[1]);
+      const double from = in_term(leaf, k, of[1]);
       value += leaf.slopes[k] * from;
-      change(open, leaf.slopes[k] * (in_terms(of[0]) - from));
+      change(open, leaf.slopes[k] * (in_term(leaf, k, of[0]) - from));
       continue;
     }
     double sum = 0.0;

@@ -8,6 +8,7 @@
 #include "base/parallel.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "fit/choices/code_choice.hpp"
+#include "fit/equal_row_errors.hpp"
 #include "fit/output_range.hpp"
 #include "fit/trees/error_weights.hpp"
 #include "model/codes.hpp"
@@ -100,6 +101,7 @@ FittedPartition finish(const ChosenInputs& inputs, const Plan& plan, const Final
     const Eigen::VectorXd weights = error_weights(*training.table, served);
     guards = guard_output_range(training.folds, weights, threads, fold_partitions, choice.chosen);
   }
+  std::optional<EqualRowErrors> equal_rows = equal_row_errors(training, fold_partitions);
   if (!training.options.intervals) fold_partitions.clear();
   Candidate& candidate = choice.chosen.candidate;
   const bool fewer = candidate.leaves < grown_leaves;
@@ -120,6 +122,7 @@ FittedPartition finish(const ChosenInputs& inputs, const Plan& plan, const Final
   summary.cv_folds = std::ssize(training.folds);
   summary.held_out_rows = choice.held_out_rows;
   summary.range_guards = std::move(guards);
+  summary.equal_rows = std::move(equal_rows);
   summary.left_out = inputs.left_out;
   summary.input_steps = inputs.steps;
   FittedPartition fitted{{training.all.regressors, std::move(partition)}, std::move(summary), {}};
@@ -130,8 +133,7 @@ FittedPartition finish(const ChosenInputs& inputs, const Plan& plan, const Final
 }
 
 FitResult assemble(const Training& training, std::vector<std::optional<FittedPartition>> fitted) {
-  FitSummary summary{.missing_values = training.table->inputs.array().isNaN().count(),
-                     .min_leaf_samples = plan_of(training).growth.min_leaf_samples,
+  FitSummary summary{.min_leaf_samples = plan_of(training).growth.min_leaf_samples,
                      .partitions = {},
                      .quadratic = !training.table->products.empty()};
   Intervals intervals = make_intervals(training, fitted);
@@ -143,12 +145,26 @@ FitResult assemble(const Training& training, std::vector<std::optional<FittedPar
   return {make_model(training.all, std::move(partitions)), std::move(summary), std::move(intervals)};
 }
 
+namespace {
+
+Eigen::Index missing_values(const KeptRows& kept, const std::vector<std::size_t>& empty_levels) {
+  const auto inputs = kept.inputs.values.array();
+  Eigen::Index count = inputs.isNaN().count();
+  for (std::size_t j = 0; j < empty_levels.size(); ++j) {
+    if (empty_levels[j] > 0) count += (inputs.col(j) == static_cast<double>(empty_levels[j] - 1)).count();
+  }
+  return count;
+}
+
+}  // namespace
+
 FitResult with_choices(FitResult result, const PreparedRows& rows) {
   const KeptRows& kept = *rows.training->kept;
-  if (!rows.codes.taken.empty()) {
-    result.model = with_codes(result.model, rows.codes.codes);
-    result.intervals = with_codes(result.intervals, rows.codes.codes);
+  if (rows.has_positions()) {
+    result.model = with_codes(result.model, rows.codes.codes, rows.empty_levels);
+    result.intervals = with_codes(result.intervals, rows.codes.codes, rows.empty_levels);
   }
+  result.summary.missing_values = missing_values(kept, rows.empty_levels);
   result.summary.samples = learned_rows(kept);
   result.summary.copies = kept.copies;
   result.summary.repeats = kept.has_repeats;

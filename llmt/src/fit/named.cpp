@@ -16,6 +16,7 @@ Model named(const Model& model, const TrainingData& data) {
     const InputColumn& input = model.inputs()[j];
     if (data.input_names.empty()) inputs.push_back(input.name);
     if (levels[j].empty() && input.codes.empty()) levels[j] = input.levels;
+    if (input.has_empty_level() && levels[j].size() + 1 == input.levels.size()) levels[j].emplace_back();
     levels[j].resize(std::min(levels[j].size(), input.levels.size()));
   }
   for (std::size_t o = 0; o < model.outputs().size() && data.output_names.empty(); ++o) {

@@ -55,7 +55,7 @@ PreparedRows prepare(const GivenRows& all, const FitOptions& options, Work& work
   const SharedMatrix columns = has_codes ? shared(at_positions(codes.codes, kept->inputs.values)) : kept->inputs;
   std::vector<int> categorical = with_codes(given.categorical, codes.codes);
   return {describe_columns(kept, columns, std::move(categorical), of_columns, work), options.terms, std::move(codes),
-          std::move(given.loss_weights)};
+          std::move(given.loss_weights), std::move(given.empty_levels)};
 }
 
 }  // namespace llmt

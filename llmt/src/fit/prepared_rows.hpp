@@ -13,10 +13,14 @@ namespace llmt {
 
 /// The rows of a fit with the loss, the codes and the columns that they are fitted with.
 struct PreparedRows {
-  std::shared_ptr<const Training> training;  ///< of linear local models where `terms` is automatic
-  LocalTerms terms;                          ///< as asked for
-  CodeChoice codes = {};                     ///< training.inputs has positions in place of these
-  Eigen::VectorXd loss_weights = {};         ///< as FitSummary::loss_weights
+  std::shared_ptr<const Training> training;    ///< of linear local models where `terms` is automatic
+  LocalTerms terms;                            ///< as asked for
+  CodeChoice codes = {};                       ///< training.inputs has positions in place of these
+  Eigen::VectorXd loss_weights = {};           ///< as FitSummary::loss_weights
+  std::vector<std::size_t> empty_levels = {};  ///< as GivenRows
+
+  /// Whether the model is fitted to other values than those that its rows will have: with_codes().
+  bool has_positions() const { return !codes.taken.empty() || !empty_levels.empty(); }
 };
 
 /// The kept rows, described by regressors. `inputs` and `categorical`: as in Training. `work`: of this.

@@ -22,7 +22,7 @@ void mark_slopes(const Model& model, const Node& leaf, std::vector<bool>& used) 
 }
 
 bool is_missing(const InputColumn& input, double value) {
-  if (std::isnan(value)) return true;
+  if (std::isnan(value)) return !input.has_empty_level();
   if (!input.is_categorical() || !input.codes.empty()) return false;  // of codes the nearest counts
   return !(value >= 0.0 && value < static_cast<double>(input.levels.size()));
 }

@@ -104,13 +104,13 @@ void check_columns_of_model(const std::vector<InputColumn>& inputs, const std::v
       throw ModelFault({"input", i}, fmt::format("\"{}\": low {}, centre {} and high {} must be finite and low <= high",
                                                  input.name, input.low, input.centre, input.high));
     }
-    if (std::ssize(input.levels) > most(Limit::categories)) {
+    if (std::ssize(input.levels) > most(Limit::categories) + (input.has_empty_level() ? 1 : 0)) {
       throw ModelFault({"input", i}, fmt::format("\"{}\": {} levels, at most {} are possible", input.name,
                                                  input.levels.size(), most(Limit::categories)));
     }
     const std::vector<double>& codes = input.codes;
     const bool ascend = std::ranges::is_sorted(codes, std::less_equal<>()) && std::ranges::all_of(codes, is_finite);
-    if (!codes.empty() && (codes.size() != input.levels.size() || !ascend)) {
+    if (!codes.empty() && (codes.size() + (input.has_empty_level() ? 1 : 0) != input.levels.size() || !ascend)) {
       throw ModelFault({"input", i}, fmt::format("\"{}\": {} codes for {} levels; they must be finite, and ascend",
                                                  input.name, codes.size(), input.levels.size()));
     }

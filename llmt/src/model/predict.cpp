@@ -39,7 +39,7 @@ template <class Body>
 void for_each_block(const char* function, const Model& model, Eigen::Index depth, const Inputs& inputs, int max_threads,
                     const Body& body) {
   check_columns_of_query(function, model, inputs);
-  const bool codes = has_codes(model.inputs());
+  const bool codes = needs_positions(model.inputs());
   const Eigen::Index size = rows_of_block(model.num_inputs(), std::ssize(model.regressors()), depth);
   parallel_for((inputs.rows() + size - 1) / size, max_threads, [&](Eigen::Index index) {
     const Eigen::Index begin = index * size;
@@ -76,7 +76,7 @@ Eigen::MatrixXd Model::predict(const Inputs& inputs, int max_threads) const {
     Eigen::VectorXd values(num_outputs());
     std::vector<Activation> active;
     active.reserve(32);
-    const bool codes = has_codes(inputs_);
+    const bool codes = needs_positions(inputs_);
     for (Eigen::Index row = 0; row < inputs.rows(); ++row) {
       x = inputs.row(row).transpose();
       for (Eigen::Index j = 0; codes && j < x.size(); ++j) x(j) = position_of(inputs_[j], x(j));
@@ -173,6 +173,7 @@ std::vector<Extrapolation> Model::extrapolation(const Inputs& inputs, int max_th
     Extrapolation* const of_row = result.data() + begin;
     for (Eigen::Index j = 0; j < num_inputs(); ++j) {
       const InputColumn& input = inputs_[j];
+      if (input.is_categorical() && input.codes.empty()) continue;  // no category is beyond another
       const double range = input.high - input.low;
       for (Eigen::Index row = 0; row < block.rows(); ++row) {
         const double value = inputs(begin + row, j);

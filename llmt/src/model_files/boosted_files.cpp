@@ -1,4 +1,6 @@
 // Boosted models as JSON: docs/file-formats.md.
+#include <cmath>
+#include <utility>
 
 #include "boosted/model/boosted_checks.hpp"
 #include "llmt/boosted_model.hpp"
@@ -28,23 +30,34 @@ Json of_feature(const BoostedFeature& feature) {
   return json;
 }
 
+// 0 in place of 0.0, since there are thousands.
+Json short_number(double value) {
+  return value == std::floor(value) && std::abs(value) < 1e6 ? Json(static_cast<int>(value)) : Json(value);
+}
+
 // Lists of numbers: a sum has thousands of splits and leaves.
 Json of_tree(const BoostedTree& tree) {
   Json splits = Json::array();
   for (const BoostedSplit& split : tree.splits) {
     splits.push_back(
-        {split.feature, split.threshold, split.half_width, split.missing_left ? 1 : 0, split.left, split.right});
+        {split.feature, split.threshold, split.half_width, short_number(split.missing_left), split.left, split.right});
   }
   Json leaves = Json::array();
+  Json means = Json::array();
+  bool has_means = false;
   for (const BoostedLeaf& leaf : tree.leaves) {
     Json of_leaf = {leaf.constant, leaf.low, leaf.high};
     for (std::size_t k = 0; k < leaf.features.size(); ++k) {
       of_leaf.push_back(leaf.features[k]);
       of_leaf.push_back(leaf.slopes[k]);
+      const double mean = leaf.means.empty() ? 0.0 : leaf.means[k];
+      means.push_back(short_number(mean));
+      has_means = has_means || mean != 0.0;
     }
     leaves.push_back(std::move(of_leaf));
   }
   Json json = {{"splits", std::move(splits)}, {"leaves", std::move(leaves)}};
+  if (has_means) json["means"] = std::move(means);
   if (tree.smallest_share != BoostedTree().smallest_share) json["smallest_share"] = tree.smallest_share;
   return json;
 }
@@ -89,12 +102,10 @@ BoostedFeature feature_from(const JsonReader& json) {
 BoostedSplit split_from(const JsonReader& json) {
   const std::vector<JsonReader> parts = json.elements();
   if (parts.size() != 6) json.fail("a split has 6 numbers");
-  const int side = parts[3].as<int>();
-  if (side != 0 && side != 1) parts[3].fail("0 or 1 is needed");
   return {.feature = parts[0].as<int>(),
           .threshold = parts[1].as<double>(),
           .half_width = parts[2].as<double>(),
-          .missing_left = side == 1,
+          .missing_left = parts[3].as<double>(),
           .left = parts[4].as<int>(),
           .right = parts[5].as<int>()};
 }
@@ -110,6 +121,19 @@ BoostedLeaf leaf_from(const JsonReader& json) {
   return leaf;
 }
 
+// One for each slope, leaf by leaf.
+void give_means(const JsonReader& json, BoostedTree& tree) {
+  const auto means = json.list<double>();
+  std::size_t slopes = 0;
+  for (const BoostedLeaf& leaf : tree.leaves) slopes += leaf.slopes.size();
+  if (means.size() != slopes) json.fail(fmt::format("{} means of {} slopes", means.size(), slopes));
+  auto next = means.begin();
+  for (BoostedLeaf& leaf : tree.leaves) {
+    const auto begin = std::exchange(next, next + std::ssize(leaf.slopes));
+    leaf.means.assign(begin, next);
+  }
+}
+
 BoostedSum sum_from(const JsonReader& json) {
   BoostedSum sum{
       .base = json.member("base").as<double>(), .rate = json.member("rate").as<double>(), .features = {}, .trees = {}};
@@ -118,6 +142,7 @@ BoostedSum sum_from(const JsonReader& json) {
     BoostedTree tree;
     for (const JsonReader& split : entry.member("splits").elements()) tree.splits.push_back(split_from(split));
     for (const JsonReader& leaf : entry.member("leaves").elements()) tree.leaves.push_back(leaf_from(leaf));
+    if (entry.has("means")) give_means(entry.member("means"), tree);
     tree.smallest_share = entry.as("smallest_share", tree.smallest_share);
     sum.trees.push_back(std::move(tree));
   }
@@ -133,9 +158,10 @@ void check_boosted_format(const JsonReader& root) {
   if (!root.has("format") || root.member("format").as<std::string>() != boosted_format_name) {
     root.fail("not a file of a boosted model, which llmt fit --boost writes");
   }
-  if (const int version = root.member("version").as<int>(); version != boosted_format_version) {
-    root.fail(fmt::format("version {} of the format of boosted models cannot be read, this program knows version {}",
-                          version, boosted_format_version));
+  if (const int version = root.member("version").as<int>(); version < 1 || version > boosted_format_version) {
+    root.fail(
+        fmt::format("version {} of the format of boosted models cannot be read, this program knows versions 1 to {}",
+                    version, boosted_format_version));
   }
 }
 

@@ -14,10 +14,13 @@ inline constexpr int model_format_version = 2;
 inline constexpr int model_format_version_with_range = 3;
 /// The version of a file with codes, which earlier programs would take for positions.
 inline constexpr int model_format_version_with_codes = 4;
+/// The version of a file in which a missing value is a level of a category, which earlier programs would not see.
+inline constexpr int model_format_version_with_empty_levels = 5;
 
-/// The format of boosted models, which this is no version of.
+/// The format of boosted models, which this is no version of. Since version 2 a row may go to both sides of a split
+/// whose feature it lacks.
 inline constexpr const char* boosted_format_name = "llmt-boosted-model";
-inline constexpr int boosted_format_version = 1;
+inline constexpr int boosted_format_version = 2;
 
 /// The value that to_json() writes.
 Json json_of(const Model& model);

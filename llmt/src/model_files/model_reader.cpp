@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "llmt/files.hpp"
 #include "llmt/limits.hpp"
@@ -87,9 +88,9 @@ int check_format(const JsonReader& root) {
     root.fail(fmt::format("not a model file: \"format\" is not \"{}\"", model_format_name));
   }
   const int version = root.member("version").as<int>();
-  if (version < model_format_version || version > model_format_version_with_codes) {
+  if (version < model_format_version || version > model_format_version_with_empty_levels) {
     root.fail(fmt::format("version {} of the model format cannot be read, this program knows versions {} to {}",
-                          version, model_format_version, model_format_version_with_codes));
+                          version, model_format_version, model_format_version_with_empty_levels));
   }
   return version;
 }
@@ -109,6 +110,14 @@ InputColumn input_from_json(const JsonReader& json, int version) {
     input.codes = codes.list<double>();
     if (input.codes.empty()) codes.fail("it is empty");
     input.levels = names_of_codes(input.codes);
+    if (json.has("empty_level")) {
+      const JsonReader level = json.member("empty_level");
+      if (!std::cmp_equal(level.as<int>(), input.codes.size())) level.fail("it is not the number of codes");
+      input.levels.emplace_back();
+    }
+  }
+  if (input.has_empty_level() && version < model_format_version_with_empty_levels) {
+    json.fail(fmt::format("a file of version {} has no level of missing values, the last one without a name", version));
   }
   return input;
 }

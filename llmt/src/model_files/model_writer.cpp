@@ -68,6 +68,7 @@ Json to_json(const InputColumn& input) {
   Json json = {{"name", input.name}, {"low", input.low}, {"high", input.high}, {"centre", input.centre}};
   if (!input.codes.empty()) {
     json["codes"] = input.codes;
+    if (input.has_empty_level()) json["empty_level"] = input.codes.size();
   } else if (input.is_categorical()) {
     json["levels"] = input.levels;
   }
@@ -112,6 +113,7 @@ Json to_json(const Partition& partition, const Model& model) {
 }
 
 int version_of(const Model& model) {
+  if (std::ranges::any_of(model.inputs(), &InputColumn::has_empty_level)) return model_format_version_with_empty_levels;
   if (has_codes(model.inputs())) return model_format_version_with_codes;
   return std::ranges::any_of(model.partitions(), has_output_range) ? model_format_version_with_range
                                                                    : model_format_version;

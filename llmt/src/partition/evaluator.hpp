@@ -39,6 +39,10 @@ class Evaluator {
   /// Applies the guards B.3 and B.4 of docs/algorithms/guards.md to `values`.
   void finish(const double* deviations, double* values) const { models_.finish(deviations, values); }
 
+  /// See LocalModels.
+  bool hold(const double* deviations, double* values) const { return models_.hold(deviations, values); }
+  void beyond(const double* deviations, double* by_regressor) const { models_.beyond(deviations, by_regressor); }
+
   /// The prediction (docs/algorithms/model.md, M.2) with its guards: sum of validity times local model, finished, and
   /// clamped (B.5).
   void combine(const std::vector<Activation>& active, const double* deviations, double* values) const;

@@ -1,5 +1,7 @@
 #include "partition/local_models.hpp"
 
+#include <cmath>
+
 #include "base/simd.hpp"
 #include "partition/clamped_product.hpp"
 #include "partition/smooth_clamp.hpp"
@@ -153,13 +155,19 @@ LLMT_INLINE void LocalModels::add_row(int node, double validity, const Row& row,
 }
 
 template <class Row>
-LLMT_INLINE void LocalModels::finish_row(const Row& row, double* values) const {
+LLMT_INLINE bool LocalModels::hold_row(const Row& row, double* values) const {
   double first = 0.0;
   const bool inside = sum_inside(0, row, first);
   for (Eigen::Index o = 0; o < residual_range_.rows(); ++o) {
     const double root = !inside ? guarded(0, o, row) : o == 0 ? first : sum(0, o, row);
     values[o] = root + smooth_clamp(values[o] - root, residual_range_(o, 0), residual_range_(o, 1));
   }
+  return inside;
+}
+
+template <class Row>
+LLMT_INLINE void LocalModels::finish_row(const Row& row, double* values) const {
+  const bool inside = hold_row(row, values);
   for (Eigen::Index o = 0; !inside && o < outputs_; ++o) {
     values[o] += beyond_root(o, row);
   }
@@ -173,6 +181,18 @@ void LocalModels::add(int node, double validity, const double* deviations, doubl
 LLMT_FOR_EACH_INSTRUCTION_SET
 void LocalModels::finish(const double* deviations, double* values) const {
   finish_row(BareRow{deviations, regressors_}, values);
+}
+
+LLMT_FOR_EACH_INSTRUCTION_SET
+bool LocalModels::hold(const double* deviations, double* values) const {
+  return hold_row(BareRow{deviations, regressors_}, values);
+}
+
+void LocalModels::beyond(const double* deviations, double* by_regressor) const {
+  for (Eigen::Index k = 0; k < regressors_; ++k) {
+    const double d = deviations[k];
+    by_regressor[k] = std::isnan(d) ? 0.0 : d - smooth_clamp(d, low(0)[k], high(0)[k]);
+  }
 }
 
 LLMT_FOR_EACH_INSTRUCTION_SET

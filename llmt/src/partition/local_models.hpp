@@ -48,6 +48,11 @@ class LocalModels {
   /// beyond the root's range.
   void finish(const double* deviations, double* values) const;
 
+  /// The two parts of finish(). hold() applies B.3 and returns whether the row lies in the root's range. beyond() gives
+  /// d - c(root), by which a row that does not lie there is beyond it: one value for each regressor.
+  bool hold(const double* deviations, double* values) const;
+  void beyond(const double* deviations, double* by_regressor) const;
+
   /// The same for rows of a block: `deviations` as in RowBlock, `sums` rows x outputs, one row after the other.
   void add(int node, const RowList& list, const double* deviations, double* sums) const;
   void finish_rows(Eigen::Index rows, const double* deviations, double* values) const;
@@ -77,6 +82,8 @@ class LocalModels {
   double beyond_root(Eigen::Index output, const Row& row) const;
   template <class Row>
   void add_row(int node, double validity, const Row& row, double* sums) const;
+  template <class Row>
+  bool hold_row(const Row& row, double* values) const;
   template <class Row>
   void finish_row(const Row& row, double* values) const;
 

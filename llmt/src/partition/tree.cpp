@@ -35,6 +35,33 @@ Partition prefix(const Partition& partition, Eigen::Index max_leaves) {
   return result;
 }
 
+Eigen::MatrixXd agreed_slope(const Partition& grown, Eigen::Index leaves) {
+  const Eigen::Index kept = 2 * std::min({leaves, leaves_that_agree, grown.num_leaves()}) - 1;
+  const Node& root = grown.nodes.front();
+  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(root.slope.rows(), root.slope.cols());
+  for (Eigen::Index i = 0; i < kept; ++i) {
+    const Node& node = grown.nodes[i];
+    if (node.is_leaf() || node.left >= kept) {
+      spread +=
+          static_cast<double>(node.samples) / static_cast<double>(root.samples) * (node.slope - root.slope).cwiseAbs2();
+    }
+  }
+  Eigen::MatrixXd slope = root.slope;
+  for (Eigen::Index o = 0; o < spread.rows(); ++o) {
+    for (Eigen::Index k = 0; k < spread.cols(); ++k) {
+      const double squared = root.slope(o, k) * root.slope(o, k);
+      slope(o, k) *= squared > spread(o, k) ? 1.0 - spread(o, k) / squared : 0.0;
+    }
+  }
+  return slope;
+}
+
+Partition grown_prefix(const Partition& grown, Eigen::Index leaves) {
+  Partition result = prefix(grown, leaves);
+  result.outer_slope = result.num_leaves() > 1 ? agreed_slope(grown, leaves) : Eigen::MatrixXd();
+  return result;
+}
+
 std::vector<int> parents_of(const Partition& partition) {
   std::vector<int> parents(partition.nodes.size(), -1);
   for (int i = 0; i < std::ssize(partition.nodes); ++i) {

@@ -12,6 +12,19 @@ namespace llmt {
 /// Undoes the split of a node.
 void make_leaf(Node& node);
 
+/// The slopes with which the tree of the first `leaves` leaves of a grown tree goes on beyond the training extent,
+/// eq. (B.4) of docs/algorithms/guards.md: the root's slopes, shrunk by the mean square spread of the slopes of those
+/// leaves, but of no more than the first 32, about them, as in a James-Stein estimate. Outputs x regressors.
+Eigen::MatrixXd agreed_slope(const Partition& grown, Eigen::Index leaves);
+
+/// The number of leaves from which on agreed_slope() stays the same.
+inline constexpr Eigen::Index leaves_that_agree = 32;
+
+/// The tree of the first `leaves` leaves of a grown tree, with an outer slope of its own: what it predicts does not
+/// depend on how large the tree was grown. One leaf goes on with the slopes that it will have: the outer slope is
+/// empty.
+Partition grown_prefix(const Partition& grown, Eigen::Index leaves);
+
 /// Parent of every node, -1 for the root.
 std::vector<int> parents_of(const Partition& partition);
 

@@ -265,9 +265,9 @@ ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitte
   for (std::size_t p = 0; p < parts.size(); ++p) {
     result.partitions.push_back(describe(result.model, p, parts[p]->choice));
   }
-  if (const CodeChoice& codes = prepared.rows().codes; !codes.taken.empty()) {
-    result.model = with_codes(result.model, codes.codes);
-    result.intervals = with_codes(result.intervals, codes.codes);
+  if (const PreparedRows& rows = prepared.rows(); rows.has_positions()) {
+    result.model = with_codes(result.model, rows.codes.codes, rows.empty_levels);
+    result.intervals = with_codes(result.intervals, rows.codes.codes, rows.empty_levels);
   }
   result.model = named(result.model, prepared.data());
   work.finish();

@@ -51,7 +51,8 @@ CrispErrors errors_in_fold(const FoldRows& fold, const GrownTree& grown, const s
   const Eigen::Index leaves = grown.partition.num_leaves();
   CrispErrors result;
   for (const double ridge : ridges) {
-    result.of_ridges.push_back(prefix_squared_errors(local(sums, 1, ridge), fold.held_out, weights, max_threads)(0));
+    result.of_ridges.push_back(
+        prefix_squared_errors(local(sums, 1, ridge), sums.partition, fold.held_out, weights, max_threads)(0));
   }
   std::vector<Eigen::VectorXd>& errors = result.of_trees;
   for (const auto& [sparse, shrinkage] : variants) {
@@ -61,9 +62,10 @@ CrispErrors errors_in_fold(const FoldRows& fold, const GrownTree& grown, const s
     }
     const Partition models =
         sparse || shrinkage > 0.0 ? local(sums, leaves, shrinkage, sparse) : as_grown(sums, leaves);
-    errors.push_back(prefix_squared_errors(models, fold.held_out, weights, max_threads));
+    errors.push_back(prefix_squared_errors(models, sums.partition, fold.held_out, weights, max_threads));
     if (sparse && leaves > 1) {  // the root of a larger tree is full
-      errors.back()(0) = prefix_squared_errors(local(sums, 1, shrinkage, true), fold.held_out, weights, max_threads)(0);
+      const Partition one_leaf = local(sums, 1, shrinkage, true);
+      errors.back()(0) = prefix_squared_errors(one_leaf, sums.partition, fold.held_out, weights, max_threads)(0);
     }
   }
   return result;

@@ -10,6 +10,7 @@
 #include "estimation/jumps.hpp"
 #include "estimation/squared_errors.hpp"
 #include "estimation/sums/leaf_sums.hpp"
+#include "partition/tree.hpp"
 #include "stream/blend_correction.hpp"
 
 namespace llmt {
@@ -82,7 +83,7 @@ void offer_blends(const TrainingRows& others, const Partition& crisp, Eigen::Ind
     for (const double jump : jumps) {
       for (const double width : widths) {
         const Validity validity{ValidityKind::blend, width};
-        BlendCorrection correction(others, prefix(blended(others, grown, validity, jump), leaves));
+        BlendCorrection correction(others, grown_prefix(blended(others, grown, validity, jump), leaves));
         if (best.offer(correction.corrected(first_ridge))) {
           best_correction = std::move(correction);
         }
@@ -100,10 +101,10 @@ void offer_blends(const TrainingRows& others, const Partition& crisp, Eigen::Ind
 Partition choose(const TrainingRows& others, const TrainingRows& held_out, Partition crisp, ValidityChoice validity) {
   if (held_out.count() < enough_rows || others.count() < enough_rows) return crisp;
   crisp.residual_range = range_of_residuals(others, held_out, crisp);
-  const Eigen::VectorXd of_prefixes = prefix_squared_errors(crisp, held_out, Eigen::VectorXd::Ones(1), 1);
+  const Eigen::VectorXd of_prefixes = prefix_squared_errors(crisp, crisp, held_out, Eigen::VectorXd::Ones(1), 1);
   Eigen::Index best_prefix = 0;
   double smallest = of_prefixes.minCoeff(&best_prefix);
-  Partition chosen = prefix(crisp, best_prefix + 1);
+  Partition chosen = grown_prefix(crisp, best_prefix + 1);
   if (validity == ValidityChoice::crisp || crisp.num_leaves() == 1) return chosen;
   if (validity == ValidityChoice::blend) {
     smallest = std::numeric_limits<double>::infinity();

@@ -9,9 +9,9 @@
 #include "base/count.hpp"
 #include "base/matrix.hpp"
 #include "data/dataset.hpp"
-#include "estimation/estimate.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "fit/pipeline.hpp"
+#include "partition/tree.hpp"
 #include "stream/snapshot.hpp"
 #include "stream/state.hpp"
 
@@ -102,7 +102,7 @@ Partition crisp_partition(const StreamSetting& setting, const StreamNode& root, 
     enter(*from.children[0]);
     enter(*from.children[1]);
   }
-  partition.outer_slope = agreed_slope(partition);
+  partition.outer_slope = agreed_slope(partition, partition.num_leaves());
   return partition;
 }
 

@@ -37,9 +37,10 @@ std::vector<std::string> table() {
       "| rows from | rate | slopes | c | patience | held out | race | one tree | splits from |",
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"};
   for (const llmt::Regime& regime : llmt::regimes) {
-    const std::string apart = regime.takes_turns    ? "each fifth in turn"
-                              : regime.held_out > 0 ? "about " + with_spaces(regime.held_out)
-                                                    : "a fifth";
+    const std::string apart = regime.takes_turns      ? "each fifth in turn"
+                              : regime.uses_all_parts ? "a fifth; each for the error"
+                              : regime.held_out > 0   ? "about " + with_spaces(regime.held_out)
+                                                      : "a fifth";
     const std::string searched = regime.searched < llmt::no_limit ? with_spaces(regime.searched) + " rows" : "all rows";
     lines.push_back(fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |", with_spaces(regime.rows), regime.rate,
                                 regime.slopes, regime.ridge, regime.patience, apart, regime.races ? "yes" : "no",

@@ -131,6 +131,7 @@ int add_below(llmt::BoostedTree& tree, const std::vector<llmt::BoostedSplit>& le
     for (std::size_t k = 0; k < std::min<std::size_t>(levels.size(), 3); ++k) {
       leaf.features.push_back(static_cast<int>(k));
       leaf.slopes.push_back(random.normal());
+      leaf.means.push_back(k == 2 ? 0.5 : 0.0);
     }
     tree.leaves.push_back(leaf);
     return -static_cast<int>(tree.leaves.size());
@@ -150,7 +151,7 @@ llmt::BoostedTree some_tree(int depth, double pruned, llmt::Random& random) {
   for (int level = 0; level < depth; ++level) {
     levels.push_back({.feature = static_cast<int>(random.below(num_features)),
                       .threshold = static_cast<double>(random.below(8)) / 4.0 - 1.0,
-                      .missing_left = random.below(2) == 0});
+                      .missing_left = static_cast<double>(random.below(3)) / 2.0});
   }
   llmt::BoostedTree tree;
   add_below(tree, levels, 0, pruned, random);
@@ -186,8 +187,9 @@ TEST(SymmetricTable, IsOfCrispTreesWithOneSplitALevel) {
   other.splits.back().threshold += 0.25;
   EXPECT_FALSE(llmt::symmetric_table(other).has_value());
   other = tree;
-  other.splits.back().missing_left = !other.splits.back().missing_left;
-  EXPECT_FALSE(llmt::symmetric_table(other).has_value());
+  other.splits.back().missing_left = 0.25;
+  const std::vector<int> needed = llmt::symmetric_table(other)->needed;
+  EXPECT_EQ(std::ranges::count(needed, other.splits.back().feature), 1);
   other = tree;
   other.leaves.back().features = {1, 0, 2};
   EXPECT_FALSE(llmt::symmetric_table(other).has_value());

@@ -87,8 +87,10 @@ TEST_F(CSource, CompiledSourceGivesTheBytesOfTheLibrary) {
       {.name = "oblique", .validity = ValidityKind::logistic, .inputs = 4, .outputs = 2, .oblique = true},
       {.name = "one leaf", .leaves = 1}};
   for (const Kind& kind : kinds) {
-    const llmt::Model model = random_models::random_model(kind, 3);
-    expect_equal(model, queries(kind, model), kind.name);
+    for (const std::uint64_t seed : {3, 4}) {  // of 4 missing values are levels
+      const llmt::Model model = random_models::random_model(kind, seed);
+      expect_equal(model, queries(kind, model), kind.name);
+    }
   }
 }
 
@@ -109,6 +111,13 @@ TEST_F(CSource, FittedModelsWithProductsAndCodesGiveTheBytesOfTheLibrary) {
     at.col(2) = x.col(2).array() + 4.9;
     expect_equal(model, at, "fitted");
   }
+  for (Eigen::Index i = 0; i < 600; i += 9) {
+    x(i, 2) = missing;
+    y(i, 0) += 5.0;
+  }
+  const llmt::Model model = llmt::fit(x, y).model;
+  EXPECT_TRUE(model.inputs()[2].has_empty_level());
+  expect_equal(model, x, "a missing code");
 }
 
 TEST_F(CSource, SumsOfTreesGiveTheBytesOfTheLibrary) {

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include "base/sums.hpp"
 #include "distributed/block_sums.hpp"
@@ -72,6 +73,56 @@ TEST(DistributedDescription, BlocksAreCountedFromZero) {
   run.last = 0;
   EXPECT_EQ(oracle::thrown<std::runtime_error>([&] { Sums::from_bytes(sealed('+', to_bytes(data)), "f"); }),
             "f: a block does not go with the rest");
+}
+
+TEST(DistributedDescription, SaysHowManyValuesAreMissing) {
+  Random random(3);
+  Eigen::MatrixXd inputs(600, 2);
+  for (double& value : inputs.reshaped()) value = random.uniform(-1.0, 1.0);
+  for (const Eigen::Index row : {7, 250, 599}) inputs(row, 1) = std::numeric_limits<double>::quiet_NaN();
+  const State state = start({"a", "b"}, "y", {.branch_rows = 200, .sample_rows = 200, .block_rows = 200});
+  EXPECT_EQ(oracle::thrown<std::runtime_error>([&] {
+              advance(state, sums({inputs, inputs.col(0)}, state, 1), {}, 1);
+            }),
+            "llmt::distributed::advance: input \"b\" has 3 missing values, which is not possible beyond one memory "
+            "(600 rows, branch_rows is 200); leave the column or these rows out, or fill them");
+}
+
+// Where the input of a split is missing, the sides have the shares of the rows that learned it.
+TEST(DistributedTop, SidesOfAMissingValueHaveTheSharesOfTheirRows) {
+  constexpr Eigen::Index rows = 4000;
+  Random random(4);
+  Eigen::MatrixXd inputs(rows, 2);
+  Eigen::VectorXd output(rows);
+  Eigen::VectorXd weights(rows);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    inputs.row(i) << random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0);
+    output(i) = std::exp(2.0 * inputs(i, 0)) + std::abs(inputs(i, 1)) + 0.05 * random.normal();
+    weights(i) = random.uniform(0.5, 2.0);
+  }
+  Options options{.branch_rows = 300, .sample_rows = 300, .block_rows = 500, .weighted = true};
+  options.fit.max_leaves = 2;
+  options.fit.validity = ValidityChoice::crisp;
+  options.fit.intervals = false;
+  State state = start({"a", "b"}, "y", options);
+  while (!state.finished()) state = advance(state, sums({inputs, output, 0, weights}, state, 1), {}, 1);
+  const std::vector<Node>& nodes = state.model().partitions()[0].nodes;
+  Eigen::VectorXd reach = Eigen::VectorXd::Zero(std::ssize(nodes));
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    for (int at = 0;;) {
+      reach(at) += weights(i);
+      const Node& node = nodes[at];
+      if (node.is_leaf()) break;
+      at = inputs(i, node.split_input) <= node.threshold ? node.left : node.right;
+    }
+  }
+  int splits_on_the_right = 0;
+  for (std::size_t at = 0; at < nodes.size(); ++at) {
+    if (nodes[at].is_leaf()) continue;
+    EXPECT_NEAR(nodes[at].missing_left, reach(nodes[at].left) / reach(static_cast<Eigen::Index>(at)), 1e-9) << at;
+    if (!nodes[nodes[at].right].is_leaf()) ++splits_on_the_right;
+  }
+  EXPECT_GE(splits_on_the_right, 2);
 }
 
 // A sample without the last level of a category: the tree that is made of it knows the level all the same.

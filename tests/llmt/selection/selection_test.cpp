@@ -4,75 +4,20 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <set>
 #include <vector>
 
-#include "data/dataset.hpp"
-#include "estimation/jumps.hpp"
-#include "llmt/model.hpp"
+#include "llmt/selection/folded_problem.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/random_trees.hpp"
 #include "selection/held_out_errors.hpp"
-#include "selection/screening.hpp"
 
 namespace {
 
-constexpr int fold_count = 3;
-
-// Rows in three folds, and a tree that was grown without each of them.
-struct Problem {
-  Problem(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& output, Eigen::Index most_leaves)
-      : x(inputs), y(output), table{x, y, Eigen::VectorXd::Ones(x.rows()), {0, 0, 0}, {0, 1, 2}, {0, 1, 2}} {
-    for (int fold = 0; fold < fold_count; ++fold) {
-      std::vector<int> learned;
-      for (int i = 0; i < x.rows(); ++i) (i % fold_count == fold ? held[fold] : learned).push_back(i);
-      const llmt::TrainingRows training = llmt::training_rows(table, learned);
-      folds.push_back({training, llmt::query_rows(table, held[fold], training)});
-      const llmt::FitOptions options =
-          random_trees::only(random_trees::kinds[0], llmt::Estimation::as_grown, most_leaves);
-      const llmt::Model grown = llmt::fit(x(learned, Eigen::all), y(learned, Eigen::all), options).model;
-      const llmt::Partition& partition = grown.partitions()[0];
-      trees.push_back({partition, llmt::jump_sizes(training, partition, 1)});
-    }
-  }
-
-  llmt::Selection select(const llmt::Candidates& candidates) const {
-    llmt::Work uncounted;
-    return llmt::select(folds, trees, candidates, Eigen::VectorXd::Ones(1), 1, uncounted);
-  }
-
-  // Sum of the squared errors of a candidate in each fold, whose model is made by itself and predicts row by row.
-  std::vector<double> errors_of(const llmt::Candidate& candidate) const {
-    std::vector<double> errors;
-    for (int fold = 0; fold < fold_count; ++fold) {
-      llmt::Work uncounted;
-      llmt::Candidate here = candidate;
-      here.leaves = std::min(candidate.leaves, trees[fold].partition.num_leaves());
-      const llmt::TrainingRows& training = folds[fold].training;
-      const llmt::Partition made = llmt::estimate(training, trees[fold], here, 1, uncounted);
-      const llmt::Model model{training.columns, training.output_columns, training.regressors, {made}};
-      errors.push_back((model.predict(x(held[fold], Eigen::all)) - y(held[fold], Eigen::all)).squaredNorm());
-    }
-    return errors;
-  }
-
-  double rmse_of(const llmt::Candidate& candidate) const {
-    double sum = 0.0;
-    for (const double error : errors_of(candidate)) sum += error;
-    return std::sqrt(sum / static_cast<double>(x.rows()));
-  }
-
-  Eigen::MatrixXd x;
-  Eigen::MatrixXd y;
-  llmt::Table table;
-  std::array<std::vector<int>, fold_count> held;
-  std::vector<llmt::FoldRows> folds;
-  std::vector<llmt::GrownTree> trees;
-};
+using folded_problem::fold_count;
+using folded_problem::Problem;
 
 llmt::Candidates candidates_with(const std::vector<double>& jumps) {
   return {.widths = {0.5, 1.0, 2.0}, .jumps = jumps, .ridges = {1e-4, 1e-2}, .shrinkages = {0.0}};
@@ -148,6 +93,73 @@ TEST(Selection, TakesJumpsWhereTheFunctionJumps) {
   }
 }
 
+// Of a step between planes both a crisp tree and a blend with a jump are right: the tree, which is simpler, stays
+// unless the blend gains beyond chance.
+TEST(Selection, JumpsAreTakenOnlyForAGainBeyondChance) {
+  int taken = 0;
+  int left = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const Eigen::MatrixXd x = oracle::uniform(300, 3, 30 + seed);
+    const double curvature = seed % 2 == 0 ? 1.0 : 0.0;
+    const Eigen::MatrixXd y = 3.0 * (x.col(0).array() > 0.1).cast<double>().matrix() + random_trees::affine(x) +
+                              curvature * (3.0 * x.col(1).array()).sin().matrix() +
+                              0.3 * oracle::uniform(300, 1, 40 + seed);
+    const Problem problem(x, y, 12);
+    const llmt::Selection selection = problem.select(candidates_with({llmt::no_jump, 1.0}));
+    const llmt::CandidateError* simple = nullptr;  // the best without a jump
+    const auto has_jumps = [](const llmt::CandidateError& each) { return each.candidate.jump < llmt::no_jump; };
+    for (const llmt::CandidateError& each : selection.best_of_kind) {
+      if (!has_jumps(each) && (!simple || each.rmse < simple->rmse)) simple = &each;
+    }
+    ASSERT_NE(simple, nullptr);
+    const bool some_gain = std::ranges::any_of(selection.best_of_kind, [&](const llmt::CandidateError& each) {
+      return has_jumps(each) && is_beyond_chance(*simple, each);
+    });
+    EXPECT_EQ(has_jumps(selection.chosen), some_gain) << seed;
+    if (!some_gain) {
+      EXPECT_EQ(selection.chosen.candidate, simple->candidate) << seed;
+    }
+    const bool some_jump = std::ranges::any_of(selection.best_of_kind, has_jumps);
+    (some_gain ? taken : left) += some_jump ? 1 : 0;
+  }
+  EXPECT_GE(taken, 1);
+  EXPECT_GE(left, 1);
+}
+
+// Least squares, the best crisp tree, and the best blend of each of the two widths that were compared on all folds.
+TEST(Selection, ListsTheBestOfEachKindOnce) {
+  const Eigen::MatrixXd x = oracle::uniform(300, 3, 50);
+  const Problem problem(x, oracle::curved(x, 0.1, 50), 12);
+  const llmt::Selection selection = problem.select(candidates_with({llmt::no_jump}));
+  ASSERT_EQ(selection.best_of_kind.size(), 4U);
+  EXPECT_EQ(selection.best_of_kind[0].candidate, (llmt::Candidate{.leaves = 1}));
+  EXPECT_EQ(selection.best_of_kind[1].candidate.validity.kind, llmt::ValidityKind::crisp);
+  EXPECT_GT(selection.best_of_kind[1].candidate.leaves, 1);
+  std::set<double> widths;
+  for (std::size_t k = 2; k < 4; ++k) {
+    EXPECT_EQ(selection.best_of_kind[k].candidate.validity.kind, llmt::ValidityKind::blend);
+    widths.insert(selection.best_of_kind[k].candidate.validity.width);
+  }
+  EXPECT_EQ(widths.size(), 2U);
+}
+
+// Leaves that have to be in order: each number of leaves has models of its own, and 1, 2, 3, 5, 8 and all are tried.
+TEST(Selection, OfTreesWithMonotoneSplitsHasTheErrorsOfSomeNumbersOfLeaves) {
+  const Eigen::MatrixXd x = oracle::uniform(300, 3, 51);
+  const Problem problem(x, oracle::curved(x, 0.3, 51), 12, fold_count, {1, 0, 0});
+  llmt::Candidates candidates = candidates_with({llmt::no_jump});
+  candidates.widths = {};
+  const Eigen::VectorXd rmse = problem.select(candidates).crisp_rmse;
+  ASSERT_EQ(rmse.size(), 12);
+  for (Eigen::Index leaves = 1; leaves <= 12; ++leaves) {
+    const bool is_tried = std::set<Eigen::Index>{1, 2, 3, 5, 8, 12}.contains(leaves);
+    EXPECT_EQ(std::isfinite(rmse(leaves - 1)), is_tried) << leaves;
+    if (is_tried) {
+      EXPECT_NEAR(rmse(leaves - 1), problem.rmse_of({.leaves = leaves}), 1e-9) << leaves;
+    }
+  }
+}
+
 llmt::CandidateError with_folds(const std::vector<double>& rmse) {
   llmt::CandidateError error;
   error.fold_rmse = Eigen::VectorXd::Map(rmse.data(), std::ssize(rmse));
@@ -171,53 +183,6 @@ TEST(Selection, ASampleHas25RowsForEachUnknownAndTenThousandAtLeast) {
   EXPECT_EQ(llmt::enough_rows(4, 10), 10000);
   EXPECT_EQ(llmt::enough_rows(40, 10), 10000);
   EXPECT_EQ(llmt::enough_rows(41, 10), 10250);
-}
-
-TEST(HeldOutErrors, HaveTheFormsLeafCountsAndErrorsOfTheirCandidates) {
-  const Eigen::MatrixXd x = oracle::uniform(300, 3, 9);
-  Problem problem(x, oracle::curved(x, 0.1, 9), 12);
-  // Jumps as if they were: 4 and 1 are apart from 0.25 in all folds.
-  for (llmt::GrownTree& tree : problem.trees) {
-    tree.jumps.setConstant(0.25);
-    tree.jumps(0) = 4.0;
-    tree.jumps(2) = 1.0;
-  }
-  llmt::Candidates candidates = candidates_with({llmt::no_jump, 8.0, 2.0, 1.5, 0.5, 0.1});
-  llmt::Work uncounted;
-  const Eigen::VectorXd weights = Eigen::VectorXd::Ones(1);
-  llmt::HeldOutErrors comparison(problem.folds, problem.trees, candidates, weights, 1, uncounted);
-  EXPECT_EQ(comparison.leaf_counts(), (std::vector<Eigen::Index>{2, 3, 5, 8, 12}));
-  // 8 keeps what none keeps, 1.5 what 2 keeps. Thresholds lie in the middle of the gap, in logarithms; below the
-  // smallest jump that is kept, at a quarter of it.
-  const std::vector<double> jumps = {llmt::no_jump, std::sqrt(4.0 * 1.0), std::sqrt(1.0 * 0.25), 0.25 / 4.0};
-  ASSERT_EQ(comparison.forms().size(), 3 * jumps.size());
-  for (std::size_t form = 0; form < comparison.forms().size(); ++form) {
-    EXPECT_EQ(comparison.forms()[form].width, candidates.widths[form % 3]) << form;
-    if (form < 3) {
-      EXPECT_EQ(comparison.forms()[form].jump, llmt::no_jump);
-    } else {
-      EXPECT_NEAR(comparison.forms()[form].jump, jumps[form / 3], 1e-12) << form;
-    }
-  }
-  const std::set<llmt::Key> keys = {{.form = 1, .leaves = 0},
-                                    {.form = 1, .leaves = 4, .ridge = 1},
-                                    {.form = 5, .leaves = 2},
-                                    {.form = 11, .leaves = 3, .ridge = 1}};
-  comparison.evaluate(keys, 2);
-  const std::map<llmt::Key, std::vector<double>> of_two = comparison.errors(2);
-  ASSERT_EQ(of_two.size(), keys.size());
-  EXPECT_TRUE(comparison.errors(3).empty());
-  for (const auto& [key, errors] : of_two) {
-    ASSERT_EQ(errors.size(), 2U);
-    const std::vector<double> expected = problem.errors_of(comparison.candidate(key));
-    for (int fold = 0; fold < 2; ++fold) EXPECT_NEAR(errors[fold], expected[fold], 1e-9) << key.form << " " << fold;
-  }
-  EXPECT_FALSE(comparison.models(*keys.begin())[0].has_value());
-  comparison.evaluate({{.form = 0, .leaves = 1}}, 3, true);
-  for (const auto& model : comparison.models({.form = 0, .leaves = 1})) {
-    ASSERT_TRUE(model.has_value());
-    EXPECT_EQ(model->num_leaves(), 3);
-  }
 }
 
 }  // namespace

@@ -188,14 +188,7 @@ TEST(Spread, IsNotLearntFromItsOwnPart) {
   for (Eigen::Index i = 0; i < 600; ++i) {
     if (e.part[static_cast<std::size_t>(i)] == 2) other.sizes(i) = 50.0 * e.sizes((i + 1) % 600);
   }
-  // The median, which is added to errors, is that of all rows, and hardly moves.
-  const llmt::Spread own = spreads_of(e)[2];
-  const llmt::Spread moved = spreads_of(other)[2];
-  ASSERT_EQ(own.nodes.size(), moved.nodes.size());
-  for (std::size_t i = 0; i < own.nodes.size(); ++i) {
-    EXPECT_EQ(own.nodes[i].column, moved.nodes[i].column);
-    EXPECT_NEAR(own.nodes[i].factor, moved.nodes[i].factor, 1e-12);
-  }
+  EXPECT_EQ(spreads_of(e)[2], spreads_of(other)[2]);
   EXPECT_NE(spreads_of(e)[1], spreads_of(other)[1]);
 }
 

@@ -205,6 +205,27 @@ TEST(UrdfText, LimitsThatAreExchangedOrEqualAreRefused) {
   EXPECT_EQ(limited("lower=\"0\" upper=\"0\""), "");
 }
 
+// 0.2 and 0.05 in rad and m; a chain counts in rad and mm, and offsets in degrees and mm.
+TEST(UrdfText, MimicsHaveTheUnitsOfBothJoints) {
+  const auto mimic = [](const std::string& leader, const std::string& type) {
+    const std::string more = "<mimic joint=\"j\" multiplier=\"0.2\" offset=\"0.05\"/>";
+    return *parse_urdf(robot("<link name=\"a\"/><link name=\"b\"/><link name=\"c\"/>\n" + joint("j", leader, "a", "b") +
+                             joint("k", type, "b", "c", more)),
+                       "arm.urdf")
+                .joints[1]
+                .mimic;
+  };
+  for (const std::string leader : {"revolute", "prismatic"}) {
+    const double per_unit = leader == "prismatic" ? 0.001 : 1.0;
+    const Mimic turns = mimic(leader, "revolute");
+    EXPECT_NEAR(turns.multiplier, 0.2 * per_unit, 1e-15) << leader;
+    EXPECT_NEAR(turns.offset, 0.05 * 57.29577951308232, 1e-14) << leader;
+    const Mimic slides = mimic(leader, "prismatic");
+    EXPECT_NEAR(slides.multiplier, 200.0 * per_unit, 1e-12) << leader;
+    EXPECT_NEAR(slides.offset, 50.0, 1e-12) << leader;
+  }
+}
+
 TEST(UrdfText, LimitsAreKeptAndContinuousJointsHaveNone) {
   const Chain chain = parse_urdf(
       robot("<link name=\"a\"/><link name=\"b\"/><link name=\"c\"/><link name=\"d\"/>\n" +

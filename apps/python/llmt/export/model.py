@@ -16,6 +16,9 @@ Floats = tuple[float, ...]
 BLANKS = " \t\r"
 """What is taken off at both ends of a label before it is compared."""
 
+MARKS = ("na", "n/a", "nan", "null", "?")
+"""Texts of a missing value in a CSV file, in small letters."""
+
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
 
 PRESENCE = sys.float_info.max
@@ -33,11 +36,17 @@ class Input:
     centre: float
     levels: tuple[str, ...] = ()  # labels of a category that rows give as text
     codes: Floats = ()  # numbers of a category that rows give as a number
+    has_empty_level: bool = False  # whether a missing value is a level, the last one
 
     @property
     def count(self) -> int:
-        """Number of levels or codes; 0 for a number."""
-        return len(self.levels) or len(self.codes)
+        """Number of levels; 0 for a number."""
+        return len(self.levels) or len(self.codes) + (1 if self.codes and self.has_empty_level else 0)
+
+    @property
+    def empty_level(self) -> int | None:
+        """The level of a missing value."""
+        return self.count - 1 if self.has_empty_level else None
 
     @property
     def numbers(self) -> dict[float, int]:
@@ -232,8 +241,8 @@ def read(model: dict[str, Any]) -> Model:
     """
     if not isinstance(model, dict) or model.get("format") != "llmt-model":
         raise ValueError('the model is not the content of a model file: its member "format" is not "llmt-model"')
-    if model.get("version") not in (2, 3, 4):
-        raise ValueError(f"the model file has the format version {model.get('version')!r}; versions 2 to 4 can be read")
+    if model.get("version") not in (2, 3, 4, 5):
+        raise ValueError(f"the model file has the format version {model.get('version')!r}; versions 2 to 5 can be read")
     inputs = tuple(
         Input(
             column["name"],
@@ -242,6 +251,7 @@ def read(model: dict[str, Any]) -> Model:
             float(column["centre"]),
             tuple(column.get("levels", [])),
             _floats(column.get("codes", [])),
+            "empty_level" in column or column.get("levels", [" "])[-1] == "",
         )
         for column in model["inputs"]
     )

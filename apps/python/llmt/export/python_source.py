@@ -30,9 +30,9 @@ def @_numbers(row):
     elif len(row) != len(@_INPUTS):
         raise ValueError("the row has %d values, the model has %d inputs" % (len(row), len(@_INPUTS)))
     x = []
-    for value, (name, _, _, _, levels, codes) in zip(row, @_INPUTS):
+    for value, (name, _, _, _, levels, codes, empty) in zip(row, @_INPUTS):
         if value is None or value != value:
-            x.append(math.nan)
+            x.append(math.nan if empty is None else float(empty))
         elif levels:
             x.append(float(levels.get(value.strip(BLANKS) if isinstance(value, str) else value, math.nan)))
         else:
@@ -51,7 +51,7 @@ def @_numbers(row):
 
 
 def @_factor(x, column):
-    _, low, high, centre, _, _ = column
+    _, low, high, centre, _, _, _ = column
     return @_hold(x - centre, low - centre, high - centre)
 
 
@@ -168,8 +168,8 @@ def NAME(row):
 
     `row` is a mapping from the names of the inputs to their values, or a sequence of the values in the order
     INPUTS.
-    A category is given by its label, or by the number that its label is the text of. None and NaN are missing values;
-    so is a label that was not in training. Raises ValueError if a value is infinite.
+    A category is given by its label, or by the number that its label is the text of. None and NaN are missing values.
+    A label that was not in training belongs to all leaves that its category would tell apart. Raises ValueError if a value is infinite.
     """
     x = @_numbers(row)
     d = @_deviations(x)
@@ -277,7 +277,11 @@ def to_python(model: dict[str, Any], name: str = "predict") -> str:
     tree = read(model)
     prefix = f"_{name}"
     columns = [
-        (c.name, c.low, c.high, c.centre, {label: i for i, label in enumerate(c.levels)} | c.numbers, c.codes)
+        (
+            *(c.name, c.low, c.high, c.centre),
+            {label: i for i, label in enumerate(c.levels)} | c.numbers,
+            *(c.codes, c.empty_level),
+        )
         for c in tree.inputs
     ]
     single = len(tree.outputs) == 1
@@ -297,7 +301,7 @@ def to_python(model: dict[str, Any], name: str = "predict") -> str:
     }
     runtime = re.sub(r"@|\b[A-Z_]+\b", lambda word: words.get(word[0], word[0]), _RUNTIME)
     return (
-        "# Local linear model tree, written by llmt.\nimport math\n\n# name, low, high, centre, levels, codes\n"
+        "# Local linear model tree, written by llmt.\nimport math\n\n# name, low, high, centre, levels, codes, level of a missing value\n"
         + _table(f"{prefix}_INPUTS", columns)
         + "# input, level, second input of a product, centre\n"
         + _table(f"{prefix}_REGRESSORS", [(r.input, r.level, r.second, r.centre) for r in tree.regressors])

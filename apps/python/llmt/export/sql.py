@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from .additive import Terms, terms
-from .model import Model, Node, Partition, read
+from .model import MARKS, Model, Node, Partition, read
 from .sql_text import (
     SQLITE_BLANKS,
     column_of,
@@ -69,7 +69,12 @@ class _Statement:
                     labels.setdefault(repr(value), i)
                 whens = " ".join(f"WHEN {string(label)} THEN {i}" for label, i in labels.items())
                 blanks = SQLITE_BLANKS if self.dialect == "sqlite" else "' '||CHR(9)||CHR(13)"
-                columns.append(f"CASE TRIM(CAST({name} AS TEXT),{blanks}) {whens} END AS x{j}")
+                text = f"TRIM(CAST({name} AS TEXT),{blanks})"
+                if column.has_empty_level:
+                    text = f"COALESCE({text},'')"
+                    marks = ",".join(string(mark) for mark in MARKS)
+                    whens += f" ELSE CASE WHEN LOWER({text}) IN ({marks}) THEN {column.empty_level} END"
+                columns.append(f"CASE {text} {whens} END AS x{j}")
                 continue
             x = f"CAST({name} AS DOUBLE PRECISION)"
             if self.dialect == "sqlite":  # a NaN is NULL; other databases refuse text that is no number
@@ -82,7 +87,8 @@ class _Statement:
                 whens = " ".join(
                     f"WHEN {number(codes[i + 1])}-{x}>={x}-{number(codes[i])} THEN {i}" for i in range(len(codes) - 1)
                 )
-                x = f"CASE WHEN {x} IS NULL THEN NULL {whens} ELSE {len(codes) - 1} END"
+                missing = "NULL" if column.empty_level is None else str(column.empty_level)
+                x = f"CASE WHEN {x} IS NULL THEN {missing} {whens} ELSE {len(codes) - 1} END"
             columns.append(f"{x} AS x{j}")
         if no_numbers:
             columns.append(f"CASE {' '.join(no_numbers)} ELSE 0 END AS no_number")
@@ -300,8 +306,8 @@ def to_sql(
     """A SELECT statement that gives the predictions of the rows of a table, one column TARGET_pred for each output.
 
     It says what `llmt predict` says, guards and missing values included, but for the rounding of sums. NULL, and NaN
-    where the database has it, is a missing value; a category is compared by its label, without blanks at the ends. An
-    infinite value, which `llmt predict` refuses, is taken, but in SQLite.
+    where the database has it, is a missing value; a category is compared by its label, without blanks at the ends. Where
+    a missing value is a level of its own, NA, N/A, NaN, null and ? that are no labels are missing, too. An infinite value, which `llmt predict` refuses, is taken, but in SQLite.
 
     `model` is what `json.loads` makes of the text of a model file. `table` is the name of the table, or a sequence of
     names: ("schema", "table"). `dialect` is "postgresql", "duckdb" or "sqlite" (3.35 or later). `keep` names columns of

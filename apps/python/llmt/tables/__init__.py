@@ -13,11 +13,11 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from .categories import by_given_levels, by_own_levels, positions_of
+from .categories import UNKNOWN, by_given_levels, by_own_levels, positions_of
 from .raw import Raw, feature_names, number_hint, place_of, refuse_infinite
 from .sources import read_raw
 
-__all__ = ["Table", "read_column", "read_table", "read_targets", "row_labels"]
+__all__ = ["UNKNOWN", "Table", "read_column", "read_table", "read_targets", "row_labels"]
 
 _OWNER = "LocalLinearTreeRegressor"
 _RESHAPE = (
@@ -34,7 +34,7 @@ class Table:
     values: np.ndarray  # (rows, columns) float64; NaN: missing; a category is its position in its column's levels
     names: list[str] | None  # None: columns without names
     levels: list[list[str]]  # of each column; []: numbers
-    unknown: list[int]  # of each column: cells with a category that is not among the given levels; they are NaN
+    unknown: list[int]  # of each column: cells with a category that is not among the given levels; they are UNKNOWN
 
 
 def read_table(
@@ -49,11 +49,12 @@ def read_table(
     """Reads a table of inputs.
 
     A column is numbers (booleans are 0 and 1) or words. Words are categories: their levels are the words that occur,
-    sorted by their bytes of UTF-8, without outer blanks; a word that is empty, NA, N/A, NaN, null or ? (in any case)
-    is a missing value, as in a CSV file that ``llmt fit`` reads. A column without any value is numbers.
+    sorted by their bytes of UTF-8, without outer blanks; an empty word is a missing value, as None and NaN are. "NA"
+    and the like are words: who has read a file may have made them missing values. A column without any value is
+    numbers.
 
     ``levels``: those of a fitted model. Columns with levels are read by label, a number by its value where the label
-    is the text of a number; a label that is not among them becomes NaN and is counted. All other columns must be
+    is the text of a number; a label that is not among them becomes UNKNOWN and is counted. All other columns must be
     numbers. ``fitted_names``: the columns' names in training, or None, to be checked as scikit-learn does.
 
     ``categorical``: names or positions of columns that are categories although they are numbers. Their labels are the

@@ -11,15 +11,16 @@ import numpy as np
 from .._core import most_categories
 from .raw import Raw, place_of, refuse_surrogates
 
-_MISSING = frozenset(("", "na", "n/a", "nan", "null", "?"))  # as in a CSV file, in any case
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
+_NO_NUMBER = frozenset(("", "na", "n/a", "nan", "null", "?"))  # missing among numbers, as in a CSV file, in any case
+UNKNOWN = -1.0
+"""Stands for a label that training had not, which is no position; NaN is a missing cell."""
 _EXACT = 2.0**53  # whole numbers from here on share a float64
 
 
 def bare(word: str) -> str:
-    """The label that a word means; empty: missing."""
-    word = word.strip(" \t\r")
-    return "" if len(word) < 5 and word.lower() in _MISSING else word
+    """The label that a word means; empty: missing. Any other word is a label: who writes "NA" may mean Namibia."""
+    return word.strip(" \t\r")
 
 
 def text_of(number: float) -> str:
@@ -84,9 +85,9 @@ def by_own_levels(raw: Raw, column: int, declared: bool, most: int | None = most
 
 
 def by_given_levels(raw: Raw, column: int, levels: list[str]) -> int:
-    """Turns the cells of a column into positions in given labels; returns how many have none and became missing.
+    """Turns the cells of a column into positions in given labels; returns how many have none and became UNKNOWN.
 
-    Without labels the column must be numbers: raises TypeError if it is words.
+    Without labels the column must be numbers: raises TypeError if it is words other than NA and the like.
     """
     words = raw.columns[column].words
     cells = raw.values[:, column]
@@ -98,7 +99,7 @@ def by_given_levels(raw: Raw, column: int, levels: list[str]) -> int:
     index = np.where(here, len(words), cells).astype(np.intp)
     labels = [bare(word) for word in words] + [""]
     if not levels:
-        is_word = np.array([label != "" for label in labels])[index]
+        is_word = np.array([label.lower() not in _NO_NUMBER for label in labels])[index]
         if is_word.any():
             row = int(np.argmax(is_word))
             raise TypeError(
@@ -108,7 +109,7 @@ def by_given_levels(raw: Raw, column: int, levels: list[str]) -> int:
         raw.writable(column)[:] = np.nan
         return 0
     position = {level: float(k) for k, level in enumerate(levels)}
-    raw.writable(column)[:] = np.array([position.get(label, np.nan) for label in labels])[index]
+    raw.writable(column)[:] = np.array([position.get(label, UNKNOWN if label else np.nan) for label in labels])[index]
     return int(np.array([label != "" and label not in position for label in labels])[index].sum())
 
 
@@ -125,9 +126,9 @@ def _numbers_by_level(raw: Raw, column: int, levels: list[str]) -> int:
     numbers, index = np.unique(cells[here], return_inverse=True)
     if any(level.lstrip("+-").isdigit() and abs(float(level)) >= _EXACT for level in levels):
         _refuse_merged(raw, column, cells)
-    known = np.array([position.get(number, np.nan) for number in numbers.tolist()])
+    known = np.array([position.get(number, UNKNOWN) for number in numbers.tolist()])
     cells[here] = known[index] if len(known) else np.nan
-    return int(np.isnan(cells[here]).sum())
+    return int((cells[here] == UNKNOWN).sum())
 
 
 def _refuse_merged(raw: Raw, column: int, cells: np.ndarray) -> None:

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <utility>
@@ -39,7 +40,7 @@ void check_columns(const std::vector<InputColumn>& inputs, const std::vector<Out
     if (!std::isfinite(deviation) || deviation <= 0.0) fail(pointer, "deviation is not a positive number");
     if (!inputs[j].codes.empty()) fail(pointer, "a boosted model has no codes");
     const std::vector<std::string>& levels = inputs[j].levels;
-    if (std::ssize(levels) > most(Limit::categories)) {
+    if (std::ssize(levels) > most(Limit::categories) + (inputs[j].has_empty_level() ? 1 : 0)) {
       fail(pointer, fmt::format("{} levels, at most {} are possible", levels.size(), most(Limit::categories)));
     }
     if (std::set<std::string>(levels.begin(), levels.end()).size() != levels.size()) {
@@ -81,6 +82,10 @@ void check_leaf(const BoostedLeaf& leaf, std::size_t features, const std::string
     }
     if (!std::isfinite(leaf.slopes[k])) fail(pointer, "a slope is not finite");
   }
+  if (!leaf.means.empty() && leaf.means.size() != leaf.slopes.size()) fail(pointer, "not one mean a slope");
+  if (!std::ranges::all_of(leaf.means, [](double mean) { return std::isfinite(mean); })) {
+    fail(pointer, "a mean is not finite");
+  }
 }
 
 // Every split but the first and every leaf is below one split, which stands before it: so all of them are reached.
@@ -100,6 +105,7 @@ void check_tree(const BoostedTree& tree, std::size_t features, const std::string
     }
     if (!std::isfinite(split.threshold)) fail(of_split, "threshold is not finite");
     if (!std::isfinite(split.half_width) || split.half_width < 0.0) fail(of_split, "half_width is negative");
+    if (!(split.missing_left >= 0.0 && split.missing_left <= 1.0)) fail(of_split, "missing_left is not from 0 to 1");
     for (const int child : {split.left, split.right}) {
       const bool is_leaf = child < 0;
       const std::size_t at = is_leaf ? -1 - static_cast<std::ptrdiff_t>(child) : child;

@@ -19,14 +19,19 @@
 namespace llmt {
 namespace {
 
-// Calls itself at soft splits only, so no deeper than Limit::model_splits_above_leaf.
+// Calls itself where a row goes to both sides, so no deeper than Limit::model_splits_above_leaf.
 double value_below(const BoostedTree& tree, const double* z, int at, double share) {
   double sum = 0.0;
   while (at >= 0) {
     const BoostedSplit& split = tree.splits[at];
     const double value = z[split.feature];
     if (std::isnan(value)) {
-      at = split.missing_left ? split.left : split.right;
+      const double left = split.missing_left;
+      if (left > 0.0 && left < 1.0) {
+        sum += value_below(tree, z, split.left, share * left);
+        share *= 1.0 - left;
+      }
+      at = left == 1.0 ? split.left : split.right;
       continue;
     }
     if (std::abs(value - split.threshold) < split.half_width) {
@@ -44,7 +49,11 @@ double value_below(const BoostedTree& tree, const double* z, int at, double shar
   double value = leaf.constant;
   for (std::size_t k = 0; k < leaf.features.size(); ++k) {
     const double of_feature = z[leaf.features[k]];
-    if (!std::isnan(of_feature)) value += leaf.slopes[k] * of_feature;
+    if (!std::isnan(of_feature)) {
+      value += leaf.slopes[k] * of_feature;
+    } else if (!leaf.means.empty()) {
+      value += leaf.slopes[k] * leaf.means[k];
+    }
   }
   return sum + share * std::clamp(value, leaf.low, leaf.high);
 }
@@ -67,10 +76,24 @@ std::vector<std::optional<SymmetricTable>> tables_of(const BoostedSum& sum, Eige
   return tables;
 }
 
+// Features that a row must have so that all tables hold for it: without one of the others it goes to one side, or
+// counts in the leaves as 0.
+std::vector<int> needed_by(const std::vector<std::optional<SymmetricTable>>& tables) {
+  std::vector<int> needed;
+  for (const std::optional<SymmetricTable>& table : tables) {
+    if (table) needed.insert(needed.end(), table->needed.begin(), table->needed.end());
+  }
+  std::ranges::sort(needed);
+  const auto repeated = std::ranges::unique(needed);
+  needed.erase(repeated.begin(), repeated.end());
+  return needed;
+}
+
 void predict_by(const BoostedModel& model, const BoostedSum& sum, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                 int max_threads, Eigen::Ref<Eigen::VectorXd> result) {
   const std::vector<std::optional<SymmetricTable>> tables = tables_of(sum, inputs.rows());
   const bool has_tables = std::ranges::any_of(tables, [](const auto& table) { return table.has_value(); });
+  const std::vector<int> needed = needed_by(tables);
   const RowBlocks blocks{inputs.rows(), rows_at_once};
   parallel_for(blocks.count(), max_threads, [&](Eigen::Index block) {
     const auto [begin, end] = blocks[block];
@@ -99,7 +122,14 @@ void predict_by(const BoostedModel& model, const BoostedSum& sum, const Eigen::R
         for (Eigen::Index i = 0; i < count; ++i) values[i] += value_of(sum.trees[k], z.col(i).data());
       }
     }
-    for (Eigen::Index i = 0; i < count; ++i) result(begin + i) = sum.base + sum.rate * values[i];
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const auto is_lacking = [&](int feature) { return std::isnan(z(feature, i)); };
+      if (std::ranges::any_of(needed, is_lacking)) {
+        values[i] = 0.0;
+        for (const BoostedTree& tree : sum.trees) values[i] += value_of(tree, z.col(i).data());
+      }
+      result(begin + i) = sum.base + sum.rate * values[i];
+    }
   });
 }
 
@@ -108,9 +138,11 @@ void predict_by(const BoostedModel& model, const BoostedSum& sum, const Eigen::R
 double feature_at(const BoostedFeature& feature, std::span<const InputColumn> inputs,
                   std::span<const double> deviations, const double* x) {
   if (feature.level >= 0) {
-    const double level = x[feature.first];
+    const InputColumn& input = inputs[feature.first];
+    double level = x[feature.first];
+    if (std::isnan(level) && input.has_empty_level()) level = static_cast<double>(input.levels.size() - 1);
     const bool is_known =
-        level >= 0.0 && level < static_cast<double>(inputs[feature.first].levels.size()) && level == std::floor(level);
+        level >= 0.0 && level < static_cast<double>(input.levels.size()) && level == std::floor(level);
     return is_known ? static_cast<double>(level == feature.level) : std::numeric_limits<double>::quiet_NaN();
   }
   const auto z = [&](int input) { return (x[input] - inputs[input].centre) / deviations[input]; };
@@ -172,6 +204,26 @@ std::vector<double> distance_outside(const BoostedModel& model, const Eigen::Ref
     }
   }
   return distance;
+}
+
+std::vector<Eigen::Index> incomplete_rows(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  check_rows("llmt::incomplete_rows", model, inputs);
+  const std::vector<bool> used = used_inputs(model);
+  std::vector<Eigen::Index> incomplete;
+  for (Eigen::Index row = 0; row < inputs.rows(); ++row) {
+    const auto is_lacking = [&](int j) {
+      const InputColumn& input = model.inputs()[j];
+      const double value = inputs(row, j);
+      if (std::isnan(value)) return !input.has_empty_level();
+      return input.is_categorical() && !(value >= 0.0 && value < static_cast<double>(input.levels.size()));
+    };
+    for (int j = 0; j < inputs.cols(); ++j) {
+      if (!used[j] || !is_lacking(j)) continue;
+      incomplete.push_back(row);
+      break;
+    }
+  }
+  return incomplete;
 }
 
 Eigen::MatrixXd BoostedModel::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads) const {

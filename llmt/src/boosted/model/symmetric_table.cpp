@@ -13,14 +13,15 @@ namespace {
 constexpr std::size_t most_levels = 8;  // what boosting grows has at most six
 
 // Finds the levels from `at` downwards. False if the splits of one differ, are soft, or are too many.
-bool find_levels(std::vector<SymmetricTable::Level>& levels, const BoostedTree& tree, int at, std::size_t level) {
+bool find_levels(SymmetricTable& table, const BoostedTree& tree, int at, std::size_t level) {
   if (at < 0) return true;
   const BoostedSplit& split = tree.splits[at];
   if (level == most_levels || split.half_width > 0.0) return false;
-  const SymmetricTable::Level here{split.feature, split.threshold, split.missing_left};
-  if (level == levels.size()) levels.push_back(here);
-  return here == levels[level] && find_levels(levels, tree, split.left, level + 1) &&
-         find_levels(levels, tree, split.right, level + 1);
+  if (level == table.levels.size()) table.levels.push_back({split.feature, split.threshold, split.missing_left == 1.0});
+  const SymmetricTable::Level& here = table.levels[level];
+  if (split.feature != here.feature || split.threshold != here.threshold) return false;
+  if (split.missing_left != (here.missing_left ? 1.0 : 0.0)) table.needed.push_back(split.feature);
+  return find_levels(table, tree, split.left, level + 1) && find_levels(table, tree, split.right, level + 1);
 }
 
 // Fills the leaves from `first` on that are below `at`, a split at `level` or a leaf.
@@ -35,6 +36,9 @@ void fill(SymmetricTable& table, const BoostedTree& tree, int at, std::size_t le
   for (std::size_t k = first; k < first + below; ++k) {
     table.leaves[k] = {leaf.constant, leaf.low, leaf.high};
     std::ranges::copy(leaf.slopes, table.slopes.begin() + static_cast<std::ptrdiff_t>(k * leaf.slopes.size()));
+  }
+  for (std::size_t k = 0; k < leaf.means.size(); ++k) {
+    if (leaf.means[k] != 0.0) table.needed.push_back(leaf.features[k]);
   }
 }
 
@@ -78,7 +82,7 @@ std::optional<SymmetricTable> symmetric_table(const BoostedTree& tree) {
   table.features = tree.leaves.front().features;
   const auto has_other_features = [&](const BoostedLeaf& leaf) { return leaf.features != table.features; };
   if (table.features.size() > most_boosted_slopes || std::ranges::any_of(tree.leaves, has_other_features) ||
-      !find_levels(table.levels, tree, root, 0)) {
+      !find_levels(table, tree, root, 0)) {
     return std::nullopt;
   }
   table.leaves.resize(std::size_t{1} << table.levels.size());

@@ -18,8 +18,6 @@ struct SymmetricTable {
     int feature = 0;
     double threshold = 0.0;
     bool missing_left = false;
-
-    bool operator==(const Level&) const = default;
   };
   struct Leaf {
     double constant = 0.0;
@@ -28,6 +26,7 @@ struct SymmetricTable {
   };
   std::vector<Level> levels;
   std::vector<int> features;
+  std::vector<int> needed;     ///< features without which a row goes to both sides, or counts in a leaf as its mean
   std::vector<Leaf> leaves;    ///< the number of a row's leaf has a bit for each level, 1: right
   std::vector<double> slopes;  ///< of each leaf
 };

@@ -9,6 +9,7 @@
 #include "estimation/sums/assembly.hpp"
 #include "numerics/forward_selection.hpp"
 #include "partition/imputed.hpp"
+#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {
@@ -102,7 +103,7 @@ void set_model(const LeafSums& sums, const Eigen::MatrixXd& coefficients, Node& 
 
 Partition with_models(const LeafSums& sums, Eigen::Index leaves, const std::vector<Eigen::MatrixXd>& models,
                       bool sparse) {
-  Partition result = prefix(sums.partition, leaves);
+  Partition result = grown_prefix(sums.partition, leaves);
   for (std::size_t i = 0; i < result.nodes.size(); ++i) {
     set_model(sums, models[i], result.nodes[i]);
     if (sparse && (i > 0 || leaves == 1)) {

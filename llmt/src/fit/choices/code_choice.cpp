@@ -172,7 +172,11 @@ CodeChoice choose_codes(const GivenRows& given, const FitOptions& options, Work&
 
 Eigen::MatrixXd at_positions(const Codes& codes, const Matrix& inputs) {
   std::vector<InputColumn> columns(codes.size());
-  for (std::size_t j = 0; j < codes.size(); ++j) columns[j].codes = codes[j];
+  for (std::size_t j = 0; j < codes.size(); ++j) {
+    if (codes[j].empty()) continue;
+    columns[j].codes = codes[j];
+    columns[j].levels.resize(codes[j].size() + 1);  // the last for missing values
+  }
   return at_positions(columns, inputs);
 }
 
@@ -181,9 +185,9 @@ std::vector<int> with_codes(std::vector<int> categorical, const Codes& codes) {
   return categorical;
 }
 
-Intervals with_codes(const Intervals& intervals, const Codes& codes) {
+Intervals with_codes(const Intervals& intervals, const Codes& codes, const std::vector<std::size_t>& empty_levels) {
   std::vector<Model> models;
-  for (const Model& model : intervals.models()) models.push_back(with_codes(model, codes));
+  for (const Model& model : intervals.models()) models.push_back(with_codes(model, codes, empty_levels));
   return {std::move(models), intervals.parts()};
 }
 

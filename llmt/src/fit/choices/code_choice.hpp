@@ -19,13 +19,13 @@ using Codes = std::vector<std::vector<double>>;
 /// `options` are checked, their terms linear or quadratic. `work`: the choice counts as a part of it.
 CodeChoice choose_codes(const GivenRows& given, const FitOptions& options, Work& work);
 
-/// The inputs with positions in place of codes.
+/// The inputs with positions in place of codes, and the position behind them in place of a missing code.
 Eigen::MatrixXd at_positions(const Codes& codes, const Eigen::Ref<const Eigen::MatrixXd>& inputs);
 
 /// The categorical inputs of a fit to positions.
 std::vector<int> with_codes(std::vector<int> categorical, const Codes& codes);
 
-/// Intervals of models that were fitted to positions.
-Intervals with_codes(const Intervals& intervals, const Codes& codes);
+/// Intervals of models that were fitted to positions. `empty_levels`: as GivenRows.
+Intervals with_codes(const Intervals& intervals, const Codes& codes, const std::vector<std::size_t>& empty_levels);
 
 }  // namespace llmt

@@ -53,7 +53,7 @@ FinalTree grow_tree(const TrainingRows& rows, const std::vector<int>& served, co
   Partition partition{
       .outputs = served, .validity = {}, .nodes = std::move(grown.nodes), .outer_slope = {}, .residual_range = {}};
   if (!plan.rule->keeps_signs) keep_signs(rows, partition, max_threads);
-  partition.outer_slope = agreed_slope(partition);
+  partition.outer_slope = agreed_slope(partition, partition.num_leaves());
   Eigen::VectorXd jumps = Eigen::VectorXd::Zero(std::ssize(partition.nodes));
   if (!plan.candidates.widths.empty() && plan.candidates.kind == ValidityKind::blend) {
     jumps = jump_sizes(rows, partition, max_threads);
