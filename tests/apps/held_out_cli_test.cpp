@@ -61,8 +61,9 @@ TEST(LlmtProgram, QuantilesDoNotCross) {
   folder.write("fresh.csv", kinked(1000, 2));
   for (const char* kind : {"", " --boost"}) {
     ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o m.json" + kind).exit_code, 0);
-    const Outcome predicted = folder.run(
-        llmt_program + " predict m.json fresh.csv --interval 0.9 --quantiles 0.05,0.25,0.45,0.5,0.55,0.75,0.95 -o p.csv");
+    const Outcome predicted =
+        folder.run(llmt_program +
+                   " predict m.json fresh.csv --interval 0.9 --quantiles 0.05,0.25,0.45,0.5,0.55,0.75,0.95 -o p.csv");
     ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
     const llmt::Csv result = llmt::Csv::read(folder.file("p.csv"));
     EXPECT_EQ(result.numbers("y_q0.05"), result.numbers("y_low"));

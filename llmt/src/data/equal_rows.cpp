@@ -34,13 +34,14 @@ constexpr int fewest_different = 10;
 constexpr Eigen::Index rows_at_once = 16384;  // rows that are hashed at a time
 constexpr int bits_of_part = 4;               // hashes with the same first bits are sorted together
 
+int different(const std::vector<int>& numbers) { return numbers.empty() ? 0 : *std::ranges::max_element(numbers) + 1; }
+
+// Of each number, how many rows have it.
 std::vector<int> sizes_of(const std::vector<int>& numbers) {
-  std::vector<int> sizes(numbers.size(), 0);
+  std::vector<int> sizes(different(numbers), 0);
   for (const int number : numbers) ++sizes[number];
   return sizes;
 }
-
-int different(const std::vector<int>& numbers) { return *std::ranges::max_element(numbers) + 1; }
 
 // Mean, over the rows, of the number of rows that are the same.
 double mean_size(const std::vector<int>& numbers) {

@@ -206,16 +206,11 @@ class Grower {
 class SpreadFit {
  public:
   explicit SpreadFit(const ErrorRows& rows) : rows_(rows), counts_(rows.columns.size()) {
-    std::vector<double> sorted(rows.errors.begin(), rows.errors.end());
-    const auto middle = sorted.begin() + std::ssize(sorted) / 2;
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    const double added = *middle > 0.0 ? floor_of_errors * *middle : floor_of_errors * rows.errors.mean();
-    logs_ = (rows.errors.array() + added).log();
     for (std::size_t j = 0; j < rows.columns.size(); ++j) {
       if (rows.columns[j].is_categorical()) {
         columns_.emplace_back();
         counts_[j].resize(rows.columns[j].levels.size(), 0.0);
-        for (Eigen::Index row = 0; row < logs_.size(); ++row) {
+        for (Eigen::Index row = 0; row < rows_.errors.size(); ++row) {
           if (const auto level = level_at(row, j)) ++counts_[j][*level];
         }
       } else {
@@ -230,7 +225,8 @@ class SpreadFit {
     Spread spread;
     std::vector<Column> of_levels(counts_.size());
     std::vector<const Column*> columns;
-    const double mean = logs_(learnt).mean();
+    const Eigen::VectorXd logs = logs_of(learnt);
+    const double mean = logs(learnt).mean();
     for (std::size_t j = 0; j < counts_.size(); ++j) {
       columns.push_back(counts_[j].empty() ? &columns_[j] : &of_levels[j]);
       if (counts_[j].empty()) {
@@ -239,23 +235,33 @@ class SpreadFit {
       }
       std::vector<Sums> sums(counts_[j].size());
       for (const int row : learnt) {
-        if (const auto level = level_at(row, j)) sums[*level] += {1.0, logs_(row)};
+        if (const auto level = level_at(row, j)) sums[*level] += {1.0, logs(row)};
       }
       const std::vector<double>& values = spread.levels.emplace_back(level_values(sums, counts_[j], mean));
       std::vector<double> of_rows;
-      for (Eigen::Index row = 0; row < logs_.size(); ++row) {
+      for (Eigen::Index row = 0; row < rows_.errors.size(); ++row) {
         const auto level = level_at(row, j);
         of_rows.push_back(level ? values[*level] : values.back());
       }
       of_levels[j] = binned(of_rows);
     }
     columns.push_back(&columns_.back());
-    spread.nodes = Grower(columns, logs_, rows_.errors).grow(std::move(learnt));
+    spread.nodes = Grower(columns, logs, rows_.errors).grow(std::move(learnt));
     if (spread.nodes.size() == 1) return {};
     return spread;
   }
 
  private:
+  // Of all errors, with a part of the median of those that are learnt from added.
+  Eigen::VectorXd logs_of(const std::vector<int>& learnt) const {
+    const Eigen::VectorXd errors = rows_.errors(learnt);
+    std::vector<double> sorted(errors.begin(), errors.end());
+    const auto middle = sorted.begin() + std::ssize(sorted) / 2;
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    const double size = *middle > 0.0 ? *middle : errors.mean();
+    return (rows_.errors.array() + floor_of_errors * size).log();
+  }
+
   std::optional<std::size_t> level_at(Eigen::Index row, std::size_t input) const {
     const double value = rows_.inputs(row, static_cast<Eigen::Index>(input));
     const bool is_known = value >= 0.0 && value < static_cast<double>(rows_.columns[input].levels.size());
@@ -265,7 +271,6 @@ class SpreadFit {
   const ErrorRows& rows_;
   std::vector<std::vector<double>> counts_;  // rows of each level; empty for numbers
   std::vector<Column> columns_;              // inputs, and the prediction; empty for categories
-  Eigen::VectorXd logs_;
 };
 
 }  // namespace

@@ -41,10 +41,10 @@ llmt::Node split(int input, double threshold, int left, Eigen::Index inputs) {
 }
 
 // Numbers whose centre is 0; one output.
-llmt::Model model_of(const std::vector<llmt::Node>& nodes, llmt::ValidityKind kind = llmt::ValidityKind::crisp) {
+llmt::Model model_of(const std::vector<llmt::Node>& nodes, const llmt::Validity& validity = {}) {
   llmt::Partition partition;
   partition.outputs = {0};
-  partition.validity = {kind, kind == llmt::ValidityKind::crisp ? 0.0 : 1.0};
+  partition.validity = validity;
   partition.nodes = nodes;
   std::vector<llmt::InputColumn> inputs;
   std::vector<llmt::Regressor> regressors;
@@ -234,26 +234,33 @@ TEST(LineByHand, AnObliqueSplitSharesItsJump) {
 }
 
 // y = w(a) - w(b): what the two inputs do cancels all along the line from (0, 0) to (1, 1).
-llmt::Model difference_of_gates(llmt::ValidityKind kind, double half_width) {
+llmt::Model difference_of_gates(const llmt::Validity& validity, double half_width) {
   std::vector<llmt::Node> nodes = {split(0, 0.5, 1, 2), split(1, 0.5, 3, 2), split(1, 0.5, 5, 2)};
   for (const double value : {0.0, -1.0, 1.0, 0.0}) nodes.push_back(leaf(value, Eigen::Vector2d::Zero()));
   for (int k = 0; k < 3; ++k) nodes[k].half_width = half_width;
-  return model_of(nodes, kind);
+  return model_of(nodes, validity);
 }
 
 TEST(LineByHand, SharesThatCancelAreSeen) {
-  const llmt::Model blend = difference_of_gates(llmt::ValidityKind::blend, 0.1);
+  const llmt::Model blend = difference_of_gates({llmt::ValidityKind::blend, 1.0}, 0.1);
   expect_shares(blend, Eigen::Vector2d::Zero(), Eigen::Vector2d::Ones(), Eigen::Vector2d(1.0, -1.0));
   for (const double half_width : {0.1, 0.01, 0.001}) {
-    const llmt::Model gates = difference_of_gates(llmt::ValidityKind::logistic, half_width);
+    const llmt::Model gates = difference_of_gates({llmt::ValidityKind::logistic, 1.0}, half_width);
     const double rise = std::tanh(0.25 / half_width);  // 1 / (1 + exp(-u)) - 1 / (1 + exp(u)), u = 0.5 / half_width
     expect_shares(gates, Eigen::Vector2d::Zero(), Eigen::Vector2d::Ones(), Eigen::Vector2d(rise, -rise));
+  }
+  // On a grid of boxes normalised Gaussians are products of a factor for each input.
+  for (const double width : {0.04, 0.1}) {
+    const llmt::Model gaussians = difference_of_gates({llmt::ValidityKind::gaussian, width}, 0.0);
+    const double rise = gaussians.predict(Eigen::RowVector2d(1.0, 0.0))(0);
+    EXPECT_GT(rise, 0.9);
+    expect_shares(gaussians, Eigen::Vector2d::Zero(), Eigen::Vector2d::Ones(), Eigen::Vector2d(rise, -rise));
   }
 }
 
 // Importance looks at eight pieces of the line, not at its kinks.
 TEST(LineByHand, ImportanceSeesWhatCancels) {
-  const llmt::Model blend = difference_of_gates(llmt::ValidityKind::blend, 0.1);
+  const llmt::Model blend = difference_of_gates({llmt::ValidityKind::blend, 1.0}, 0.1);
   const Eigen::MatrixXd importance = llmt::importance(blend, Eigen::RowVector2d(1.0, 1.0));
   EXPECT_NEAR(importance(0, 0), 0.5, 1e-12);
   EXPECT_NEAR(importance(0, 1), 0.5, 1e-12);

@@ -27,7 +27,7 @@ LoggedRows log_with_lags(std::uint64_t seed) {
   for (Eigen::Index t = 1; t < count; ++t) {
     u(t) = random.uniform(0.0, 1.0) < 0.05 ? random.uniform(-2.0, 2.0) : u(t - 1);
     const double drive = 0.3 * u(t) + 0.1 * std::abs(u(t));
-    y(t) = 0.8 * y(t - 1) + drive - 0.05 * y(t - 1) * y(t - 1) + 0.02 * random.normal();
+    y(t) = 0.7 * y(t - 1) + 0.2 * std::sin(y(t - 1)) + drive + 0.02 * random.normal();
   }
   LoggedRows rows{Eigen::MatrixXd(count - 2, 4), y.tail(count - 2)};
   rows.x << y.segment(1, count - 2), y.head(count - 2), u.tail(count - 2), u.segment(1, count - 2);

@@ -37,6 +37,39 @@ Sample lacking(Eigen::Index rows, double share, std::uint64_t seed) {
 // A row is incomplete if it lacks the first input; the third one is constant, so no model uses it.
 bool is_incomplete(const Sample& s, Eigen::Index row) { return std::isnan(s.x(row, 0)); }
 
+// The folds' models with their spreads, and their predictions, one column a model.
+struct Folds {
+  const llmt::FitResult& fit;
+
+  double spread(std::size_t fold, const Eigen::RowVectorXd& x) const {
+    const std::vector<llmt::Spread>& spreads = fit.intervals.parts()[fold].spreads;
+    return spreads.empty() ? 1.0 : llmt::spread_at(spreads[0], Eigen::MatrixXd(x), 0, predictions(x)(fold));
+  }
+
+  Eigen::VectorXd predictions(const Eigen::RowVectorXd& x) const {
+    Eigen::VectorXd result(std::ssize(fit.intervals.models()));
+    for (Eigen::Index f = 0; f < result.size(); ++f) result(f) = fit.intervals.models()[f].predict(x)(0, 0);
+    return result;
+  }
+
+  // tau^2 of (I.3).
+  double usual_disagreement(const Sample& train) const {
+    const std::vector<std::vector<Eigen::Index>>& held_out = fit.summary.held_out;
+    const auto count = static_cast<double>(held_out.size());
+    double squares = 0.0;
+    for (std::size_t f = 0; f < held_out.size(); ++f) {
+      std::vector<double> sizes;
+      for (const Eigen::Index row : held_out[f]) {
+        const Eigen::VectorXd of_models = predictions(train.x.row(row));
+        sizes.push_back(std::abs(of_models(f) - of_models.mean()) / spread(f, train.x.row(row)));
+      }
+      std::ranges::sort(sizes);
+      squares += std::pow(sizes[sizes.size() / 2] * std::sqrt(count / (count - 1.0)) / 0.6744897501960817, 2) / count;
+    }
+    return squares;
+  }
+};
+
 // The ends over the given kinds of held-out rows, by sorting all values; the m-th from outside.
 struct Ends {
   double lower;
@@ -45,22 +78,24 @@ struct Ends {
 Ends sorted_ends(const llmt::FitResult& fit, const Sample& train, bool complete, bool incomplete,
                  const Eigen::RowVectorXd& x, std::size_t m) {
   const std::vector<std::vector<Eigen::Index>>& held_out = fit.summary.held_out;
+  const Folds folds{fit};
+  Eigen::VectorXd spreads(std::ssize(held_out));
+  for (std::size_t f = 0; f < held_out.size(); ++f) spreads(f) = folds.spread(f, x);
+  Eigen::VectorXd predicted = folds.predictions(x);
+  const double mean = predicted.mean();
+  const double variance = (predicted.array() - mean).square().sum() / static_cast<double>(predicted.size() - 1);
+  const double usual = folds.usual_disagreement(train) * spreads.squaredNorm() / static_cast<double>(spreads.size());
+  const double left = std::sqrt(std::max(0.0, 1.0 - usual / variance));
+  predicted = mean + left * (predicted.array() - mean);
   std::vector<double> lower;
   std::vector<double> upper;
   for (std::size_t f = 0; f < held_out.size(); ++f) {
-    const llmt::Model& model = fit.intervals.models()[f];
-    const std::vector<llmt::Spread>& spreads = fit.intervals.parts()[f].spreads;
-    const auto spread = [&](const Eigen::MatrixXd& at, double prediction) {
-      return spreads.empty() ? 1.0 : llmt::spread_at(spreads[0], at, 0, prediction);
-    };
-    const double predicted = model.predict(x)(0, 0);
     for (const Eigen::Index row : held_out[f]) {
       if (!(is_incomplete(train, row) ? incomplete : complete)) continue;
-      const Eigen::MatrixXd at = train.x.row(row);
-      const double of_row = model.predict(at)(0, 0);
-      const double residual = std::abs(train.y(row, 0) - of_row) / spread(at, of_row);
-      lower.push_back(predicted - residual * spread(x, predicted));
-      upper.push_back(predicted + residual * spread(x, predicted));
+      const double of_row = folds.predictions(train.x.row(row))(f);
+      const double width = std::abs(train.y(row, 0) - of_row) / folds.spread(f, train.x.row(row)) * spreads(f);
+      lower.push_back(predicted(f) - width);
+      upper.push_back(predicted(f) + width);
     }
   }
   std::ranges::sort(lower);
@@ -210,7 +245,7 @@ TEST(Intervals, ATextThatIsCutOffOrAlteredIsRefusedWithThePlace) {
   const std::size_t residuals = text.find("\"residuals\"");
   const std::size_t number = text.find_first_of("0123456789", residuals);
   EXPECT_EQ(refusal(text.substr(0, number)).find("m.json: not JSON, or cut off: "), 0U);
-  EXPECT_NE(refusal(text.substr(0, number)).find(", in /intervals/0/residuals/0"), std::string::npos);
+  EXPECT_NE(refusal(text.substr(0, number)).find(", in /intervals/0/parts/0/residuals/0"), std::string::npos);
   text.insert(number, "-");
   EXPECT_EQ(refusal(text).find("m.json: /intervals: "), 0U) << refusal(text);
 }

@@ -188,14 +188,7 @@ TEST(Spread, IsNotLearntFromItsOwnPart) {
   for (Eigen::Index i = 0; i < 600; ++i) {
     if (e.part[static_cast<std::size_t>(i)] == 2) other.sizes(i) = 50.0 * e.sizes((i + 1) % 600);
   }
-  // The median, which is added to errors, is that of all rows, and hardly moves.
-  const llmt::Spread own = spreads_of(e)[2];
-  const llmt::Spread moved = spreads_of(other)[2];
-  ASSERT_EQ(own.nodes.size(), moved.nodes.size());
-  for (std::size_t i = 0; i < own.nodes.size(); ++i) {
-    EXPECT_EQ(own.nodes[i].column, moved.nodes[i].column);
-    EXPECT_NEAR(own.nodes[i].factor, moved.nodes[i].factor, 1e-12);
-  }
+  EXPECT_EQ(spreads_of(e)[2], spreads_of(other)[2]);
   EXPECT_NE(spreads_of(e)[1], spreads_of(other)[1]);
 }
 
@@ -240,7 +233,8 @@ TEST(Quantiles, AreTheEndsOfIntervalsInOrder) {
   EXPECT_NEAR(levels[2], 0.5, 1e-15);
   const auto row = [](double value) { return Eigen::MatrixXd::Constant(1, 1, value); };
   // The second interval lies beyond the prediction, 3.
-  const auto found = llmt::quantiles_from({{row(1), row(9)}, {row(4), row(5)}, {row(2), row(6)}}, row(3), probabilities);
+  const std::vector<llmt::Bounds> bounds = {{row(1), row(9)}, {row(4), row(5)}, {row(2), row(6)}};
+  const auto found = llmt::quantiles_from(bounds, row(3), probabilities);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0], (Eigen::MatrixXd(1, 4) << 1, 3, 4, 6).finished());
   for (const std::vector<double>& bad : {std::vector<double>{0.0}, {1.0}, {0.5, 0.5}, {0.5, 0.4}, {oracle::missing}}) {
