@@ -75,7 +75,7 @@ TEST(BoostedModel, HasHalfWidthsThatAreOrderStatisticsOfResiduals) {
       .levels = {{}}};
   const llmt::BoostedModel two = with({{{1, 2, 3, 4, 5}}, {{2, 4, 6, 8}, spread}});
   EXPECT_EQ(half_width(two, 0.5, 0.5), 3.0);  // 1 1 2 2 3 3 4 4 5
-  EXPECT_EQ(half_width(two, 0.5, 0.6), 5.0);  // 1 2 3 4 4 5 8 12 16
+  EXPECT_EQ(half_width(two, 0.5, 0.6), 4.0);  // 1 2 3 4 4 5 8 12 16
   EXPECT_EQ(half_width(two, 0.9, 0.6), 16.0);
 }
 

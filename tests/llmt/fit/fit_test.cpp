@@ -279,8 +279,8 @@ TEST(Fit, CrossValidationIsTheHeldOutErrorOfRegrownTrees) {
     double squared = 0.0;
     for (const llmt::Fold& fold : llmt::make_folds(150, options.folds)) {
       const llmt::Model model = llmt::fit(x(fold.train, Eigen::all), y(fold.train, Eigen::all),
-                                          as_grown({.max_leaves = 12, .significance = 1.0}))
-                                    .model.prefix(leaves);
+                                          as_grown({.max_leaves = leaves, .significance = 1.0}))
+                                    .model;
       squared += (model.predict(x(fold.held_out, Eigen::all)) - y(fold.held_out, Eigen::all)).squaredNorm();
     }
     EXPECT_NEAR(summary.crisp_cv_rmse(leaves - 1), std::sqrt(squared / 150.0), 1e-12);
