@@ -223,7 +223,8 @@ void add_predict(CLI::App& app) {
       "Apply a model to a table\n"
       "Writes the table's rows, in order, with more columns. TARGET_pred: the prediction. outside: 1 where an input "
       "lies outside its range in training. outside_by: how far, as a multiple of that range. leverage: of the row on "
-      "its local models; 1 and more is extrapolation (not of a boosted model). If the table holds a target, its RMSE "
+      "its local models; 1 and more: far from the rows of its leaf (not of a boosted model). If the table holds a "
+      "target, its RMSE "
       "is reported.");
   command->footer("Example: llmt predict concrete.json new.csv -o predicted.csv");
   const auto arguments = std::make_shared<PredictArguments>();

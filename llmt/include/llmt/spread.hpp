@@ -33,9 +33,14 @@ struct Spread {
   bool operator==(const Spread&) const = default;
 };
 
-/// The spread at a row of `inputs`, whose model predicts `prediction` there. Categories are positions in their levels.
+/// The spread at a row of `inputs`, whose model predicts `prediction` there. Categories are positions in their levels,
+/// also those of empty cells that are a level: with_empty_levels().
 double spread_at(const Spread& spread, const Eigen::Ref<const Eigen::MatrixXd>& inputs, Eigen::Index row,
                  double prediction);
+
+/// `inputs` with the position of the level of empty cells in their place, where a column has such a level.
+Eigen::MatrixXd with_empty_levels(const std::vector<InputColumn>& columns,
+                                  const Eigen::Ref<const Eigen::MatrixXd>& inputs);
 
 /// Throws std::invalid_argument if a spread does not fit a model with these inputs: a number of lists or of values, a
 /// tree that is none, a column out of range, a number that is not finite, a factor that is not positive or beyond a

@@ -40,7 +40,7 @@ std::vector<SumResiduals> held_out_residuals(const BoostingData& data, Eigen::In
                                              const Eigen::VectorXd& residuals) {
   constexpr std::size_t most = 10000;
   const DealtRows of = dealt_rows(data, residuals.size());
-  const Eigen::MatrixXd x = data.x(of.rows, Eigen::all);
+  const Eigen::MatrixXd x = with_empty_levels(data.inputs, data.x(of.rows, Eigen::all));
   const Eigen::VectorXd predictions = data.y.col(output)(of.rows) - residuals;
   const Eigen::VectorXd errors = residuals.cwiseAbs();
   const std::vector<Spread> spreads = fit_spreads({x, data.inputs, predictions, errors}, of.part, of.parts);

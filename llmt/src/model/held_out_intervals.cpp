@@ -10,21 +10,24 @@
 namespace llmt {
 namespace {
 
-// A held-out row, by the model that was fitted without it.
-struct Place {
-  int row = 0;
-  int part = 0;
+// The held-out rows of all folds and the part that each is of: its fold, or one of five of the only fold.
+struct DealtFolds {
+  std::vector<int> rows;
+  std::vector<int> part;
+  int parts = 1;
 };
 
-std::vector<Place> places_of(const std::vector<std::span<const int>>& held_out) {
-  std::vector<Place> places;
+DealtFolds dealt(const std::vector<std::span<const int>>& held_out) {
+  DealtFolds result{.rows = {}, .part = {}, .parts = static_cast<int>(held_out.size())};
   for (std::size_t f = 0; f < held_out.size(); ++f) {
-    for (const int row : held_out[f]) places.push_back({row, static_cast<int>(f)});
+    result.rows.insert(result.rows.end(), held_out[f].begin(), held_out[f].end());
+    result.part.insert(result.part.end(), held_out[f].size(), static_cast<int>(f));
   }
-  if (held_out.size() != 1 || std::ssize(places) < fewest_rows_of_spread) return places;
-  const std::vector<int> part = dealt_parts(std::ssize(places), parts_of_one_fold);
-  for (std::size_t i = 0; i < places.size(); ++i) places[i].part = part[i];
-  return places;
+  if (held_out.size() == 1 && std::ssize(result.rows) >= fewest_rows_of_spread) {
+    result.part = dealt_parts(std::ssize(result.rows), parts_of_one_fold);
+    result.parts = parts_of_one_fold;
+  }
+  return result;
 }
 
 // The square root of (K - 1) / K, for K models, times what each prediction differs from the mean of the other models':
@@ -49,66 +52,66 @@ double usual_size(const Eigen::VectorXd& differences) {
   return *middle / median_of_normal;
 }
 
+// What the spreads of all outputs divide: one spread an output for each part, none if all are 1 everywhere.
+std::vector<std::vector<Spread>> divide_by_spreads(const std::vector<InputColumn>& columns, const Eigen::MatrixXd& x,
+                                                   const Eigen::MatrixXd& predictions, const DealtFolds& dealt,
+                                                   Eigen::MatrixXd& residuals, Eigen::MatrixXd& differences) {
+  std::vector<std::vector<Spread>> spreads(dealt.parts);
+  bool has_spread = false;
+  for (Eigen::Index o = 0; o < residuals.cols(); ++o) {
+    std::vector<Spread> of_output =
+        fit_spreads({x, columns, predictions.col(o), residuals.col(o)}, dealt.part, dealt.parts);
+    for (Eigen::Index i = 0; i < residuals.rows(); ++i) {
+      const double spread = spread_at(of_output[dealt.part[i]], x, i, predictions(i, o));
+      residuals(i, o) /= spread;
+      differences(i, o) /= spread;
+    }
+    for (int p = 0; p < dealt.parts; ++p) {
+      has_spread = has_spread || !of_output[p].nodes.empty();
+      spreads[p].push_back(std::move(of_output[p]));
+    }
+  }
+  if (!has_spread) spreads.assign(dealt.parts, {});
+  return spreads;
+}
+
 }  // namespace
 
 Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                              const Eigen::Ref<const Eigen::MatrixXd>& outputs,
                              const std::vector<std::span<const int>>& held_out, int max_threads) {
   if (models.empty()) return {};
-  const std::vector<Place> places = places_of(held_out);
-  const auto count = static_cast<Eigen::Index>(places.size());
-  std::vector<int> rows;
-  std::vector<int> part;
-  int parts = 0;
-  for (const Place& place : places) {
-    rows.push_back(place.row);
-    part.push_back(place.part);
-    parts = std::max(parts, place.part + 1);
-  }
-  parts = std::max(parts, static_cast<int>(models.size()));
-  const Eigen::MatrixXd x = inputs(rows, Eigen::all);
+  const bool is_one_fold = models.size() == 1;
+  const DealtFolds folds = dealt(held_out);
+  const std::vector<InputColumn>& columns = models.front().inputs();
+  const Eigen::MatrixXd x = with_empty_levels(columns, inputs(folds.rows, Eigen::all));
   std::vector<Eigen::MatrixXd> by_model;
   for (const Model& model : models) by_model.push_back(model.predict(x, max_threads));
-  Eigen::MatrixXd predictions(count, outputs.cols());
-  for (Eigen::Index i = 0; i < count; ++i) {
-    predictions.row(i) = by_model[models.size() == 1 ? 0 : static_cast<std::size_t>(part[i])].row(i);
-  }
-  Eigen::MatrixXd residuals = (outputs(rows, Eigen::all) - predictions).cwiseAbs();
+  Eigen::MatrixXd predictions(x.rows(), outputs.cols());
+  for (Eigen::Index i = 0; i < x.rows(); ++i) predictions.row(i) = by_model[is_one_fold ? 0 : folds.part[i]].row(i);
+  Eigen::MatrixXd residuals = (outputs(folds.rows, Eigen::all) - predictions).cwiseAbs();
   Eigen::MatrixXd differences = differences_of_folds(predictions, by_model);
-  std::vector<std::vector<Spread>> spreads(parts);
-  bool has_spread = false;
-  for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
-    const std::vector<Spread> of_output =
-        fit_spreads({x, models.front().inputs(), predictions.col(o), residuals.col(o)}, part, parts);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const double spread = spread_at(of_output[part[i]], x, i, predictions(i, o));
-      residuals(i, o) /= spread;
-      differences(i, o) /= spread;
-    }
-    for (int p = 0; p < parts; ++p) {
-      has_spread = has_spread || !of_output[p].nodes.empty();
-      spreads[p].push_back(of_output[p]);
-    }
-  }
+  std::vector<std::vector<Spread>> spreads = divide_by_spreads(columns, x, predictions, folds, residuals, differences);
   const std::vector<bool> incomplete = incomplete_rows(models, x);
-  std::vector<std::vector<int>> whole(parts);
-  std::vector<std::vector<int>> lacking(parts);
-  for (Eigen::Index i = 0; i < count; ++i) (incomplete[i] ? lacking : whole)[part[i]].push_back(static_cast<int>(i));
-  std::vector<HeldOutPart> made;
-  for (int p = 0; p < parts; ++p) {
-    HeldOutPart& of_part = made.emplace_back();
-    of_part.model = models.size() == 1 ? 0 : static_cast<std::size_t>(p);
-    of_part.residuals = residuals(whole[p], Eigen::all);
-    of_part.incomplete = residuals(lacking[p], Eigen::all);
-    if (has_spread) of_part.spreads = std::move(spreads[p]);
-    if (models.size() > 1 && count >= fewest_rows_of_spread) {
-      whole[p].insert(whole[p].end(), lacking[p].begin(), lacking[p].end());
-      for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
-        of_part.disagreement.push_back(usual_size(differences.col(o)(whole[p])));
-      }
+  std::vector<HeldOutPart> parts;
+  for (int p = 0; p < folds.parts; ++p) {
+    std::vector<int> whole;
+    std::vector<int> lacking;
+    for (int i = 0; i < static_cast<int>(x.rows()); ++i) {
+      if (folds.part[i] == p) (incomplete[i] ? lacking : whole).push_back(i);
+    }
+    HeldOutPart& part = parts.emplace_back();
+    part.model = is_one_fold ? 0 : static_cast<std::size_t>(p);
+    part.residuals = residuals(whole, Eigen::all);
+    part.incomplete = residuals(lacking, Eigen::all);
+    part.spreads = std::move(spreads[p]);
+    if (is_one_fold || x.rows() < fewest_rows_of_spread) continue;
+    whole.insert(whole.end(), lacking.begin(), lacking.end());
+    for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
+      part.disagreement.push_back(usual_size(differences.col(o)(whole)));
     }
   }
-  return {std::move(models), std::move(made)};
+  return {std::move(models), std::move(parts)};
 }
 
 }  // namespace llmt

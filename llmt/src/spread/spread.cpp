@@ -51,6 +51,17 @@ double spread_at(const Spread& spread, const Eigen::Ref<const Eigen::MatrixXd>& 
   return node->factor;
 }
 
+Eigen::MatrixXd with_empty_levels(const std::vector<InputColumn>& columns,
+                                  const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  Eigen::MatrixXd result = inputs;
+  for (std::size_t j = 0; j < columns.size(); ++j) {
+    if (!columns[j].has_empty_level()) continue;
+    const auto level = static_cast<double>(columns[j].levels.size() - 1);
+    for (double& value : result.col(static_cast<Eigen::Index>(j))) value = std::isnan(value) ? level : value;
+  }
+  return result;
+}
+
 void check_spread(const Spread& spread, const std::vector<InputColumn>& inputs) {
   if (spread.nodes.empty()) {
     if (!spread.levels.empty()) refuse("it has levels and no nodes");

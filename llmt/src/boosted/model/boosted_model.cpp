@@ -244,6 +244,7 @@ Bounds BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, 
 std::vector<Bounds> BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                                             const std::vector<double>& levels, int max_threads) const {
   const Eigen::MatrixXd predicted = predict(inputs, max_threads);
+  const Eigen::MatrixXd at = with_empty_levels(inputs_, inputs);
   std::vector<Bounds> bounds(levels.size(), Bounds{predicted, predicted});
   for (Eigen::Index o = 0; o < num_outputs(); ++o) {
     const std::vector<SumResiduals>& parts = sums_[o].held_out;
@@ -256,7 +257,7 @@ std::vector<Bounds> BoostedModel::intervals(const Eigen::Ref<const Eigen::Matrix
       std::vector<ScaledResiduals> scaled(parts.size());
       for (Eigen::Index row = begin; row < end; ++row) {
         for (std::size_t p = 0; p < parts.size(); ++p) {
-          scaled[p] = {parts[p].residuals, 0.0, spread_at(parts[p].spread, inputs, row, predicted(row, o))};
+          scaled[p] = {parts[p].residuals, 0.0, spread_at(parts[p].spread, at, row, predicted(row, o))};
         }
         for (std::size_t k = 0; k < levels.size(); ++k) {
           const double width = largest_value(scaled, values_outside(levels[k], rows));
