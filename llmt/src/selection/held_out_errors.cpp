@@ -8,7 +8,6 @@
 #include "estimation/local_estimate.hpp"
 #include "estimation/squared_errors.hpp"
 #include "llmt/statistics.hpp"
-#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {
@@ -130,7 +129,7 @@ HeldOutErrors::Evaluated HeldOutErrors::evaluate_form(std::size_t fold, const st
     const Eigen::Index leaves = std::min(leaf_counts_[same.front().leaves], tree.num_leaves());
     if (sample && sample->serves(samples_[fold], leaves)) return;
     sample =
-        std::make_shared<Sample>(samples_[fold], grown_prefix(tree, leaves), max_threads_, candidates_.sparse.back());
+        std::make_shared<Sample>(samples_[fold], prefix(tree, leaves), max_threads_, candidates_.sparse.back());
     work.check();
   };
   // The sums of a tree serve all its prefixes. This does not hold for Gaussians, whose prefixes have validities of
