@@ -7,6 +7,7 @@
 #include "llmt/boosted.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/random.hpp"
+#include "llmt/training_data.hpp"
 
 namespace {
 
@@ -95,7 +96,11 @@ TEST(BoostProgram, PredictsIntervals) {
   const llmt::Csv answer = llmt::Csv::parse(predicted.out, "answer");
   const llmt::BoostedModel model = llmt::load_boosted(folder.file("m.json"));
   Eigen::MatrixXd inputs(answer.rows(), model.num_inputs());
-  for (Eigen::Index j = 0; j < inputs.cols(); ++j) inputs.col(j) = answer.numbers(model.inputs()[j].name);
+  for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
+    const llmt::InputColumn& column = model.inputs()[j];
+    inputs.col(j) = column.is_categorical() ? llmt::category_values(answer.texts(column.name), column.levels)
+                                            : answer.numbers_or_missing(std::vector{column.name}).col(0).eval();
+  }
   const llmt::Bounds bounds = model.intervals(inputs, 0.9);
   EXPECT_EQ(answer.numbers("y_low"), bounds.lower.col(0));
   EXPECT_EQ(answer.numbers("y_high"), bounds.upper.col(0));

@@ -227,19 +227,21 @@ TEST(LlmtProgram, WordsAreCategoriesAndCellsMayBeMissing) {
   EXPECT_EQ(values["unknown_categories"], 1);
   const std::vector<double> y = values["targets"][0]["predicted"];
   EXPECT_NEAR(y[0], 0.5, 0.15);
-  EXPECT_EQ(y[1], y[2]);  // a category that was not there is a missing one
+  // A category that was not there is like all of them, by their parts of the rows; an empty cell is a level.
+  EXPECT_NEAR(y[1], (0.5 + 0.5 + 2.5) / 3.0, 0.2);
+  EXPECT_NE(y[1], y[2]);
   EXPECT_NEAR(y[4], 2.5, 0.15);
   EXPECT_NE(folder.run(llmt_program + " predict m.json q.csv")
-                .err.find("1 values of categories that were not in training, taken as missing"),
+                .err.find("1 value of categories that were not in training"),
             std::string::npos);
 
   const Outcome inspected = folder.run(llmt_program + " inspect m.json");
   ASSERT_EQ(inspected.exit_code, 0) << inspected.err;
-  EXPECT_NE(inspected.out.find("3 categories: blue, green, red"), std::string::npos);
+  EXPECT_NE(inspected.out.find("4 categories: blue, green, red, (empty)"), std::string::npos);
   EXPECT_NE(inspected.out.find("colour = blue"), std::string::npos) << inspected.out;
-  EXPECT_NE(inspected.out.find("colour in {green, red}"), std::string::npos) << inspected.out;
+  EXPECT_NE(inspected.out.find("colour in {green, red, (empty)}"), std::string::npos) << inspected.out;
   const json leaves = json::parse(folder.run(llmt_program + " inspect m.json --json").out);
-  EXPECT_EQ(leaves["inputs"][0]["levels"], (std::vector<std::string>{"blue", "green", "red"}));
+  EXPECT_EQ(leaves["inputs"][0]["levels"], (std::vector<std::string>{"blue", "green", "red", ""}));
   EXPECT_EQ(leaves["regressors"].back(), "x");
 }
 
@@ -256,8 +258,8 @@ TEST(LlmtProgram, ExplanationsAddUp) {
     double sum = target["reference"];
     for (const json& entry : target["contributions"]) {
       sum += entry["contribution"].get<double>();
-      EXPECT_EQ(entry["value"].is_null(),
-                (row == 6 && entry["input"] == "x") || (row == 8 && entry["input"] == "colour"));
+      EXPECT_EQ(entry["value"].is_null(), row == 6 && entry["input"] == "x");
+      if (row == 8 && entry["input"] == "colour") EXPECT_EQ(entry["value"], "(empty)");
     }
     EXPECT_NEAR(sum, target["prediction"], 1e-12);
     EXPECT_NEAR(target["prediction"], predicted["targets"][0]["predicted"][row - 1], 1e-12);

@@ -212,10 +212,10 @@ def test_intervals_hold_about_what_they_promise():
     np.testing.assert_array_equal(quantiles[:, 2], fitted.predict(new))
     assert (np.diff(quantiles, axis=1) >= 0).all()
     np.testing.assert_allclose(ends.mean(axis=1), fitted.predict(new), atol=1e-12)
-    # 200 residuals: 0.9 within 3 sqrt(0.9 * 0.1 / 200)
+    # 1000 residuals, and as many new rows
     assert 0.84 < ((observed >= ends[:, 0]) & (observed <= ends[:, 1])).mean() < 0.96
-    with pytest.raises(ValueError, match="needs at least 999 held-out rows"):
-        fitted.predict_interval(X, coverage=0.999)
+    with pytest.raises(ValueError, match="needs at least 1999 held-out rows"):
+        fitted.predict_interval(X, coverage=0.9995)
 
 
 def test_gross_errors_are_told_with_what_helps():

@@ -7,7 +7,7 @@ from llmt import BoostedLocalLinearTreeRegressor, LocalLinearTreeRegressor, dist
 
 # A value other than the default for each parameter.
 TREE = {
-    "max_leaves": 3,
+    "max_leaves": 1,
     "min_samples_leaf": 150,
     "rule": "ra",
     "validity": "crisp",

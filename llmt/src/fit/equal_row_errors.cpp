@@ -63,7 +63,7 @@ std::optional<EqualRowErrors> equal_row_errors(const Training& training, const s
   for (std::size_t f = 0; f < of_folds.size(); ++f) {
     const FoldRows& fold = training.folds[f];
     std::vector<bool> is_trained(kind.size(), false);
-    for (const int row : fold.training.rows) is_trained[kind[row]] = true;
+    for (const Eigen::Index row : training.kept->folds[f].train) is_trained[kind[row]] = true;
     std::vector<int> rows_new;
     std::vector<int> rows_known;
     for (const int row : fold.held_out.rows) (is_trained[kind[row]] ? rows_known : rows_new).push_back(row);

@@ -128,8 +128,7 @@ HeldOutErrors::Evaluated HeldOutErrors::evaluate_form(std::size_t fold, const st
   const auto sample_for = [&](const std::vector<Key>& same, std::shared_ptr<Sample>& sample) {
     const Eigen::Index leaves = std::min(leaf_counts_[same.front().leaves], tree.num_leaves());
     if (sample && sample->serves(samples_[fold], leaves)) return;
-    sample =
-        std::make_shared<Sample>(samples_[fold], prefix(tree, leaves), max_threads_, candidates_.sparse.back());
+    sample = std::make_shared<Sample>(samples_[fold], prefix(tree, leaves), max_threads_, candidates_.sparse.back());
     work.check();
   };
   // The sums of a tree serve all its prefixes. This does not hold for Gaussians, whose prefixes have validities of

@@ -111,7 +111,8 @@ std::vector<Eigen::MatrixXd> quantiles_from(const std::vector<Bounds>& bounds,
 
 Eigen::Index values_outside(double level, Eigen::Index rows) {
   constexpr double slack = 1.0 + 1e-12;  // keeps 0.1 * 30 from becoming 2
-  return static_cast<Eigen::Index>(std::floor((1.0 - level) * static_cast<double>(rows + 1) * slack));
+  const auto outside = static_cast<Eigen::Index>(std::floor((1.0 - level) * static_cast<double>(rows + 1) * slack));
+  return std::min(outside, rows);  // a level below 1 / (rows + 1)
 }
 
 void check_level(const char* what, double level, Eigen::Index rows) {

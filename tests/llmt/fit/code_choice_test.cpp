@@ -123,12 +123,12 @@ TEST(CodeChoice, OnlyWholeNumbersOfAShortRangeWithEnoughRows) {
 
 // Rows of weight 0, missing values and a second output.
 TEST(CodeChoice, TakesWhatAFitTakes) {
-  Sample train = coded(400, 7);
+  Sample train = coded(800, 7);
   train.y.conservativeResize(Eigen::NoChange, 2);
   train.y.col(1) = 100.0 * train.y.col(0) + 5.0 * train.x.col(2);
-  Eigen::VectorXd weights = Eigen::VectorXd::Ones(400);
-  for (int i = 0; i < 400; i += 60) train.x(i, 0) = std::nan("");
-  for (int i = 5; i < 400; i += 20) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(800);
+  for (int i = 0; i < 800; i += 60) train.x(i, 0) = std::nan("");
+  for (int i = 5; i < 800; i += 20) {
     weights(i) = 0.0;
     train.x(i, 0) = 77.5;
   }

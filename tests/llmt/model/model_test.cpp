@@ -129,7 +129,7 @@ TEST(ModelFile, RoundTripIsExact) {
 TEST(ModelFile, SaysWhatItCannotAccept) {
   const std::string json = llmt::to_json(example());
   EXPECT_EQ(error_of(replaced(json, "\"version\": 2", "\"version\": 1")),
-            "m.json: version 1 of the model format cannot be read, this program knows versions 2 to 4");
+            "m.json: version 1 of the model format cannot be read, this program knows versions 2 to 5");
   EXPECT_EQ(error_of(replaced(json, "llmt-model", "other")),
             "m.json: not a model file: \"format\" is not \"llmt-model\"");
   EXPECT_EQ(error_of(replaced(json, "\"low\": ", "\"lo\": ")), "m.json: /inputs/0: member \"low\" is missing");

@@ -84,7 +84,7 @@ TEST(OutputRange, PrefixesAndRenamedModelsKeepIt) {
 
 TEST(OutputRange, FilesKeepIt) {
   for (const Kind& kind : kinds) {
-    const llmt::Model model = clamped(random_model(kind, 8), one_range());
+    const llmt::Model model = clamped(random_model(kind, 9), one_range());
     const std::string text = to_json(model);
     EXPECT_NE(text.find("\"version\": 3"), std::string::npos);
     const llmt::Model back = llmt::from_json(text);
@@ -101,7 +101,7 @@ TEST(OutputRange, FilesKeepIt) {
 
 // The file of a shared partition whose first output is clamped, with another range.
 std::string with_range(const std::string& range) {
-  std::string text = to_json(clamped(random_model(kinds[2], 10), one_range()));
+  std::string text = to_json(clamped(random_model(kinds[2], 13), one_range()));
   const std::size_t begin = text.find("\"output_range\": ") + 16;
   return text.replace(begin, text.find("\"nodes\"", begin) - begin, range + ", ");
 }
