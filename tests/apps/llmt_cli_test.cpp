@@ -231,9 +231,9 @@ TEST(LlmtProgram, WordsAreCategoriesAndCellsMayBeMissing) {
   EXPECT_NEAR(y[1], (0.5 + 0.5 + 2.5) / 3.0, 0.2);
   EXPECT_NE(y[1], y[2]);
   EXPECT_NEAR(y[4], 2.5, 0.15);
-  EXPECT_NE(folder.run(llmt_program + " predict m.json q.csv")
-                .err.find("1 value of categories that were not in training"),
-            std::string::npos);
+  EXPECT_NE(
+      folder.run(llmt_program + " predict m.json q.csv").err.find("1 value of categories that were not in training"),
+      std::string::npos);
 
   const Outcome inspected = folder.run(llmt_program + " inspect m.json");
   ASSERT_EQ(inspected.exit_code, 0) << inspected.err;
