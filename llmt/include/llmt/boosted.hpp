@@ -97,9 +97,9 @@ struct BoostResult {
 /// BoostedModel::intervals() gives intervals, from the held-out rows' residuals and their spread.
 ///
 /// Inputs may be missing (NaN). A category is taken as the indicators of its most frequent levels,
-/// `most_boosted_levels` of them. Weights are as for fit(); a row of
-/// the weight k is k equal rows, to the byte. Up to the values of the seed, the result does not depend on the scale of
-/// outputs and inputs, nor on the number of threads, for which it is the same to the byte.
+/// `most_boosted_levels` of them. Weights are as for fit(); a row of the weight k is k equal rows, to the byte. Up to
+/// the values of the seed, the result does not depend on the scale of outputs and inputs, nor on the number of threads,
+/// for which it is the same to the byte.
 ///
 /// Throws std::invalid_argument as fit(), and for fewer than `fewest_boosted_rows` different rows.
 BoostResult fit_boosted(const TrainingData& data, const BoostOptions& options = {}, const Progress& progress = {});

@@ -79,7 +79,7 @@ std::vector<bool> used_inputs(const BoostedModel& model);
 std::vector<double> distance_outside(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs);
 
 /// Rows, ascending, that lack an input which the model uses: a number is missing, or a category is unknown, see
-/// InputColumn::levels. Intervals have the same width there as elsewhere, and are likely too narrow. Throws as
+/// InputColumn::levels. Their intervals are calibrated with those of all rows, and are likely too narrow. Throws as
 /// BoostedModel::predict().
 std::vector<Eigen::Index> incomplete_rows(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs);
 
