@@ -9,6 +9,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "report/signals/signals_summary.hpp"
+
 namespace llmt::apps {
 namespace {
 
@@ -137,6 +139,33 @@ void check_names(const ComparedTables& tables) {
   }
 }
 
+Eigen::VectorXd noise_of(const Csv& csv, const std::vector<std::string>& names) {
+  Eigen::VectorXd noise = Eigen::VectorXd::Constant(std::ssize(names), std::nan(""));
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const std::string column = report::noise_column(names[k]);
+    if (!csv.has(column)) continue;
+    const Eigen::VectorXd of_rows = csv.numbers(column);
+    Eigen::Index bad = 0;
+    if (!(of_rows.minCoeff(&bad) >= 0.0)) {
+      throw std::runtime_error(fmt::format("{}:{}: column \"{}\" is {}, must be a standard deviation of at least 0",
+                                           csv.name(), csv.line_of(bad), column, of_rows(bad)));
+    }
+    noise(static_cast<Eigen::Index>(k)) = std::sqrt(of_rows.squaredNorm() / static_cast<double>(of_rows.size()));
+  }
+  return noise.array().isNaN().all() ? Eigen::VectorXd() : noise;
+}
+
+double cutoff_of(const Csv& csv) {
+  if (!csv.has(report::cutoff_column)) return 0.0;
+  const Eigen::VectorXd of_rows = csv.numbers(report::cutoff_column);
+  for (Eigen::Index i = 0; i < of_rows.size(); ++i) {
+    if (of_rows(i) > 0.0 && of_rows(i) == of_rows(0)) continue;
+    throw std::runtime_error(fmt::format("{}:{}: column \"{}\" is {}, must be above 0 and the same in all rows",
+                                         csv.name(), csv.line_of(i), report::cutoff_column, of_rows(i)));
+  }
+  return of_rows.size() > 0 ? of_rows(0) : 0.0;
+}
+
 Comparison read_comparison(const ComparedTables& tables, bool every_column) {
   const Csv simulated = Csv::read(tables.simulated, tables.mark);
   const Csv measured = Csv::read(tables.measured, tables.mark);
@@ -156,6 +185,9 @@ Comparison read_comparison(const ComparedTables& tables, bool every_column) {
   std::iota(rows.begin(), rows.end(), Eigen::Index{0});
   comparison.lines = measured.lines_of(rows);
   read_times(tables, simulated, measured, comparison);
+  comparison.inputs.noise = noise_of(measured, tables.inputs);
+  comparison.measured.noise = noise_of(measured, tables.outputs);
+  if (!tables.time.empty()) comparison.inputs.cutoff = cutoff_of(measured);
   comparison.inputs.order = tables.order;
   if (!tables.order.empty() && std::ranges::find(tables.inputs, tables.order) == tables.inputs.end()) {
     const Csv& holder = measured.has(tables.order) ? measured : simulated;
@@ -164,6 +196,10 @@ Comparison read_comparison(const ComparedTables& tables, bool every_column) {
     with_order.rightCols(1) = holder.numbers(tables.order);
     comparison.inputs.values = with_order;
     comparison.inputs.names.push_back(tables.order);
+    if (comparison.inputs.noise.size() > 0) {
+      comparison.inputs.noise.conservativeResize(comparison.inputs.values.cols());
+      comparison.inputs.noise.tail(1).setZero();
+    }
   }
   return comparison;
 }

@@ -57,6 +57,15 @@ std::vector<Eigen::Index> runs_of(const Csv& csv, const std::string& column);
 /// Throws std::invalid_argument for names that are given twice or contradict each other.
 void check_names(const ComparedTables& tables);
 
+/// Standard deviations that the columns "noise_" + name hold, as `llmt signals` writes them: the root of their mean
+/// square; NaN where there is no such column, and empty if there is none at all. Throws std::runtime_error for one
+/// below 0.
+Eigen::VectorXd noise_of(const Csv& csv, const std::vector<std::string>& names);
+
+/// Of the filter that `llmt signals` says the rows went through, in its column "cutoff_hz"; 0: there is none. Throws
+/// std::runtime_error for values that are not above 0 or not the same.
+double cutoff_of(const Csv& csv);
+
 /// `every_column`: the inputs were not named. Throws std::runtime_error naming file, line and column.
 Comparison read_comparison(const ComparedTables& tables, bool every_column);
 

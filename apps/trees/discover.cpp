@@ -8,6 +8,7 @@
 
 #include "llmt/csv.hpp"
 #include "llmt/files.hpp"
+#include "report/signals/signals_summary.hpp"
 #include "report/terms/of_terms.hpp"
 #include "report/terms/terms_summary.hpp"
 #include "shared/cli.hpp"
@@ -65,6 +66,13 @@ std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& argument
   const discovery::Rows rows = discovery::rows_of(comparison.inputs, comparison.simulated.col(0));
   return report::with_own_terms(std::move(library), read_terms(arguments.terms, comparison.inputs, output, rows, taken),
                                 arguments.own_terms_only, rows);
+}
+
+// What `llmt signals` writes beside the signals: the noise of another column, and the cutoff.
+bool is_constant_of_signals(const Csv& csv, const std::string& name) {
+  return name == report::cutoff_column || std::ranges::any_of(csv.columns(), [&](const std::string& other) {
+           return name == report::noise_column(other);
+         });
 }
 
 // A column that nobody measured is often all zeros.
@@ -169,7 +177,7 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
     for (const std::string& name : simulated.columns()) {
       const bool is_output = std::ranges::find(arguments.outputs, name) != arguments.outputs.end();
       const bool is_label = name == arguments.order || name == arguments.time || name == arguments.group;
-      if (!is_output && !is_label) arguments.inputs.push_back(name);
+      if (!is_output && !is_label && !is_constant_of_signals(simulated, name)) arguments.inputs.push_back(name);
     }
   }
   check_names(arguments);
@@ -189,7 +197,9 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
     comparison.simulated = source.command.run(comparison.inputs.values, source.command.nominal());
     arguments.simulated = "--simulate";
   }
-  comparison.inputs.noise = errors_of_inputs(arguments.input_noise, comparison.inputs.names);
+  if (!arguments.input_noise.empty()) {
+    comparison.inputs.noise = errors_of_inputs(arguments.input_noise, comparison.inputs.names);
+  }
   const report::TermsSummary summary = discovered(arguments, comparison, source);
   const bool is_worse = discovery::is_worse(summary.missing);
   if (!arguments.corrected.empty() && !is_worse) {
@@ -236,7 +246,8 @@ void add_discover(CLI::App& app) {
   command->add_option("--group", arguments->group, "Recording that each row is of; with --time")->type_name("COLUMN");
   add_names(
       *command, "--input-noise", arguments->input_noise, "INPUT=NUMBER",
-      "Standard deviations of the errors of inputs, or auto: from neighbouring rows [auto for rows in time, else 0]");
+      "Standard deviations of the errors of inputs, or auto: from neighbouring rows [columns noise_INPUT of MEASURED, "
+      "else auto for rows in time, else 0]");
   add_names(*command, "--only", arguments->only, "FAMILY", "Try the built-in terms of these families alone");
   add_names(*command, "--without", arguments->without, "FAMILY", "Do not try the built-in terms of these families");
   add_input_file(*command, "--terms", arguments->terms,

@@ -68,21 +68,23 @@ discovery::Signals filtered(const SignalsArguments& arguments, const Csv& csv) {
   }
 }
 
-void write_signals(const std::string& path, const report::LogColumns& columns, const Csv& csv,
-                   const discovery::Signals& signals) {
+void write_signals(const std::string& path, const report::SignalsSummary& summary, const Csv& csv) {
+  const report::LogColumns& columns = summary.columns;
+  const discovery::Signals& signals = summary.signals;
   std::vector<std::string> header;
-  for (const std::string& name : report::signal_names(columns)) header.push_back(csv_field(name));
+  for (const std::string& name : report::signal_names(columns, signals.dense)) header.push_back(csv_field(name));
   std::vector<std::vector<std::string>> kept;
   for (const std::string& name : columns.kept) kept.push_back(csv.texts(name));
   const std::vector<std::string> runs = columns.group.empty() ? std::vector<std::string>() : csv.texts(columns.group);
   const Eigen::MatrixXd values = report::signal_values(signals);
+  const std::string noise = fmt::format("{}", fmt::join(report::signal_constants(summary), ","));
   std::string text = fmt::format("{}\n", fmt::join(header, ","));
   for (Eigen::Index i = 0; i < values.rows(); ++i) {
     const auto row = static_cast<std::size_t>(signals.rows[i]);
     if (!runs.empty()) text += fmt::format("{},", csv_field(runs[row]));
     text += fmt::format("{}", fmt::join(values.row(i), ","));
     for (const std::vector<std::string>& cells : kept) text += fmt::format(",{}", csv_field(cells[row]));
-    text += "\n";
+    text += fmt::format(",{}\n", noise);
   }
   write_file(path, text);
 }
@@ -90,7 +92,7 @@ void write_signals(const std::string& path, const report::LogColumns& columns, c
 void signals_command(SignalsArguments arguments) {
   check(arguments);
   if (arguments.rate != 0.0) arguments.columns.time = "t";
-  report::signal_names(arguments.columns);  // refuses names before the log is read
+  report::signal_names(arguments.columns, true);  // refuses names before the log is read
   const Csv csv = read_table(arguments.log, arguments.mark);
   report::SignalsSummary summary{.log = csv.name(),
                                  .table = arguments.output,
@@ -105,7 +107,7 @@ void signals_command(SignalsArguments arguments) {
     summary.firsts.push_back(csv.line_of(stretch.first));
     summary.lasts.push_back(csv.line_of(stretch.last));
   }
-  if (!arguments.output.empty()) write_signals(arguments.output, arguments.columns, csv, summary.signals);
+  if (!arguments.output.empty()) write_signals(arguments.output, summary, csv);
   if (arguments.json) {
     print_json(report::signals_json(summary));
   } else {
@@ -120,7 +122,7 @@ void add_signals(CLI::App& app) {
       "signals", "Filter a log of positions and torques, and differentiate it, for models of the motion");
   command->footer(
       "Example: llmt signals log.csv --time t --position q1,q2 --torque u1,u2 --cutoff 10 -o table.csv\n"
-      "The table has t, q1, q2, dq1, dq2, ddq1, ddq2, u1, u2.");
+      "The table has t, q1, q2, dq1, dq2, ddq1, ddq2, u1, u2, the noise of each, noise_q1 to noise_u2, and cutoff_hz.");
   const auto arguments = std::make_shared<SignalsArguments>();
   add_input_file(*command, "log", arguments->log, "Signals in the order of time (CSV; - reads standard input)")
       ->required();
@@ -132,10 +134,14 @@ void add_signals(CLI::App& app) {
   add_number(*command, "--cutoff", arguments->options.cutoff, above_zero,
              "Of the low pass, in Hz: its gain is 0.71 there")
       ->required();
-  add_numbers(*command, "--standstill", arguments->options.standstill, not_negative,
-              "Leave rows out below this speed, one for all positions or one each; 0 keeps all [from the noise]");
+  add_numbers(
+      *command, "--standstill", arguments->options.standstill, not_negative,
+      "Leave rows out below this speed, one for all positions or one each; 0 keeps all [keep all; with --independent "
+      "from the noise]");
   add_count<Eigen::Index>(*command, "--every", arguments->options.every, 1,
-                          "Samples from one row to the next [as many as make noise independent]");
+                          "Samples from one row to the next [a sixth of what makes noise independent]");
+  command->add_flag("--independent", arguments->options.independent,
+                    "Rows whose noise is independent, without standstill and reversals: for a fit of your own");
   command->add_option("--group", arguments->columns.group, "Which run a row belongs to; no filter reaches across runs")
       ->type_name("COLUMN");
   add_names(*command, "--keep", arguments->columns.kept, "COLUMN", "To be taken over as it stands at the same time");

@@ -43,7 +43,10 @@ TEST(LlmtSignals, WritesATableWhoseColumnsAreTheDerivatives) {
   const json report = json::parse(outcome.out);
   const llmt::Csv table = llmt::Csv::read(folder.file("table.csv"));
   EXPECT_EQ(table.columns(),
-            (std::vector<std::string>{"run", "t", "q1", "q2", "dq1", "dq2", "ddq1", "ddq2", "u1", "u2", "load, kg"}));
+            (std::vector<std::string>{"run",        "t",          "q1",       "q2",        "dq1",
+                                      "dq2",        "ddq1",       "ddq2",     "u1",        "u2",
+                                      "load, kg",   "noise_q1",   "noise_q2", "noise_dq1", "noise_dq2",
+                                      "noise_ddq1", "noise_ddq2", "noise_u1", "noise_u2",  "cutoff_hz"}));
   EXPECT_EQ(report["columns"].get<std::vector<std::string>>(), table.columns());
   EXPECT_EQ(report["rows"], table.rows());
   EXPECT_EQ(report["runs"].size(), 2U);
@@ -55,6 +58,8 @@ TEST(LlmtSignals, WritesATableWhoseColumnsAreTheDerivatives) {
   const Eigen::MatrixXd numbers = table.numbers(std::vector<std::string>{"t", "dq1", "ddq2", "u1", "load, kg"});
   EXPECT_GT(table.rows(), 100);
   const double noise = report["noise"]["dq1"];
+  EXPECT_TRUE((table.numbers("noise_dq1").array() == noise).all());
+  EXPECT_TRUE((table.numbers("cutoff_hz").array() == 10.0).all());
   EXPECT_GT(noise, 0.0);
   EXPECT_LT(noise, 0.01);
   for (Eigen::Index i = 0; i < numbers.rows(); ++i) {
@@ -68,8 +73,9 @@ TEST(LlmtSignals, WritesATableWhoseColumnsAreTheDerivatives) {
 TEST(LlmtSignals, SaysWhatItDidInAShortText) {
   const Folder folder;
   write_log(folder);
-  const Outcome outcome = folder.run(on_log + " --group run -o table.csv");
+  const Outcome outcome = folder.run(on_log + " --group run --independent -o table.csv");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_FALSE(llmt::Csv::read(folder.file("table.csv")).has("cutoff_hz"));
   for (const char* words : {"from 5000 samples of log.csv at 500", "2 runs without a gap", "low pass of 10",
                             "Ends: ", "Rows: ", "Standstill: ", "Written to table.csv", "noise in the log"}) {
     EXPECT_NE(outcome.out.find(words), std::string::npos) << words << " in " << outcome.out;

@@ -138,7 +138,7 @@ def test_what_is_found_makes_the_replay_of_another_run_right():
     spec = mujoco.MjSpec.from_string(CART)
     rows = llmt.signals(drive(16.0, 1, 3.5, drag), **LOG)
     parameters = lm.parameters(spec, ["mass", "damping"])
-    found = llmt.discover(lm.inverse_dynamics(spec, parameters), parameters, rows.inputs, rows.torques, time=rows.time)
+    found = llmt.discover(lm.inverse_dynamics(spec, parameters), parameters, rows.inputs, rows.torques, signals=rows)
     assert "dx |dx|" in [term["formula"] for term in found.to_dict()["effects"]]
     other = drive(6.0, 2, 3.5, drag)
     fixed, callback = found.mujoco(spec)

@@ -37,7 +37,11 @@ def test_rows_are_those_of_the_program(log, tmp_path):
     command = f"{PROGRAM} signals log.csv --time t --position q --torque u --cutoff 10 --group run --keep load --json"
     run = subprocess.run([*command.split(), "-o", "rows.csv"], cwd=tmp_path, capture_output=True, text=True, check=True)
     made = llmt.signals(frame, **OPTIONS)
-    pandas.testing.assert_frame_equal(made.table, pandas.read_csv(tmp_path / "rows.csv"), check_dtype=False, rtol=1e-12)
+    rows = pandas.read_csv(tmp_path / "rows.csv")
+    pandas.testing.assert_frame_equal(made.table, rows[list(made.table)], check_dtype=False, rtol=1e-12)
+    for name, noise in made.noise.items():
+        assert (rows["noise_" + name] == noise).all()
+    assert (rows["cutoff_hz"] == made.cutoff).all()
     said, program = made.to_dict(), json.loads(run.stdout)
     for key in ("rows", "every", "noise", "noise_in_log", "standstill", "columns"):
         assert said[key] == program[key]
@@ -64,6 +68,12 @@ def test_a_table_comes_back_as_the_kind_that_was_given(log, kind):
     assert type(made.table) is type(given) and type(made.inputs) is type(given)
     plain = llmt.signals(log, **OPTIONS)
     np.testing.assert_array_equal(np.asarray(made.table["ddq"], dtype=float), plain.table["ddq"])
+
+
+def test_rows_of_independent_noise_have_no_reversals(log):
+    made = llmt.signals(log, **OPTIONS, independent=True)
+    assert made.cutoff is None and np.abs(made.table["dq"]).min() > 0.1
+    assert len(made.time) < len(llmt.signals(log, **OPTIONS).time) / 6
 
 
 def test_what_cannot_be_used_is_refused_with_its_row(log):

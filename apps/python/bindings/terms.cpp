@@ -211,17 +211,21 @@ void unlocked(const Work& work) {
 nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input_names, const std::string& order,
                       const std::vector<std::string>& only, const std::vector<std::string>& without,
                       const std::vector<double>& instants, const std::vector<Eigen::Index>& runs,
-                      const std::vector<double>& input_noise, const Array& simulated, const Array& measured,
-                      const std::vector<std::string>& output_names, const nb::object& predict,
-                      const nb::object& jacobian, const nb::list& parameters, bool offset, bool scale,
-                      const std::vector<OwnTerm>& own_terms, bool own_terms_only, double held_out, std::uint64_t seed,
-                      const std::string& simulated_name, const std::string& measured_name, const nb::object& report) {
+                      const std::vector<double>& input_noise, const std::vector<double>& output_noise, double cutoff,
+                      const Array& simulated, const Array& measured, const std::vector<std::string>& output_names,
+                      const nb::object& predict, const nb::object& jacobian, const nb::list& parameters, bool offset,
+                      bool scale, const std::vector<OwnTerm>& own_terms, bool own_terms_only, double held_out,
+                      std::uint64_t seed, const std::string& simulated_name, const std::string& measured_name,
+                      const nb::object& report) {
   Question question = question_of(inputs, input_names, order, simulated, output_names, only, without);
   question.inputs.instants = Eigen::Map<const Eigen::VectorXd>(instants.data(), std::ssize(instants));
   question.inputs.runs = runs;
   question.inputs.noise = Eigen::Map<const Eigen::VectorXd>(input_noise.data(), std::ssize(input_noise));
+  question.inputs.cutoff = cutoff;
   set_simulation(question, predict, parameters, offset, scale, question.simulated);
-  const discovery::MeasuredOutputs outputs{output_names, rows_of(measured)};
+  const discovery::MeasuredOutputs outputs{
+      output_names, rows_of(measured),
+      Eigen::Map<const Eigen::VectorXd>(output_noise.data(), std::ssize(output_noise))};
   report::TermsSummary summary{.simulated = simulated_name,
                                .measured = measured_name,
                                .corrected = "",
@@ -288,10 +292,10 @@ auto corrected(const Array& inputs, const std::vector<std::string>& input_names,
 void add_terms(nb::module_& module) {
   using nb::arg;
   module.def("find_missing", &find_missing, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("only"),
-             arg("without"), arg("instants"), arg("runs"), arg("input_noise"), arg("simulated"), arg("measured"),
-             arg("output_names"), arg("predict").none(), arg("jacobian").none(), arg("parameters"), arg("offset"),
-             arg("scale"), arg("terms"), arg("own_terms_only"), arg("held_out"), arg("seed"), arg("simulated_name"),
-             arg("measured_name"), arg("report").none());
+             arg("without"), arg("instants"), arg("runs"), arg("input_noise"), arg("output_noise"), arg("cutoff"),
+             arg("simulated"), arg("measured"), arg("output_names"), arg("predict").none(), arg("jacobian").none(),
+             arg("parameters"), arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"), arg("held_out"),
+             arg("seed"), arg("simulated_name"), arg("measured_name"), arg("report").none());
   module.def("corrected", &corrected, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("only"),
              arg("without"), arg("simulated"), arg("output_names"), arg("predict").none(), arg("parameters"),
              arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"), arg("state"), arg("elsewhere"),

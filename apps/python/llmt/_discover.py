@@ -24,6 +24,7 @@ from llmt._given import (
     predictor_of,
 )
 from llmt._results import Findings, draw_points, html_table, names, number
+from llmt._signals import Signals
 
 
 class Missing(Findings):
@@ -157,6 +158,7 @@ def _search(
     order: str,
     time: Any,
     groups: Any,
+    signals: Signals | None,
     input_noise: Mapping[str, float] | str | None,
     only: Any,
     without: Any,
@@ -203,12 +205,22 @@ def _search(
             raise ValueError(f"simulated has the shape {start.shape}, measured has {values.shape}")
     question["simulated"] = np.ascontiguousarray(start)
     own = dict(terms or {})
+    known: Mapping[str, float] = {}
+    if signals is not None:
+        time = signals.time if time is None else time
+        groups = signals.groups if groups is None else groups
+        known = signals.noise
     instants, runs = in_time(time, groups, len(rows), bool(order))
+    errors = noise_of(input_noise, columns)
+    if input_noise is None and known:
+        errors = [known.get(name, np.nan) for name in columns]
     made = _core.find_missing(
         **question,
         instants=instants,
         runs=runs,
-        input_noise=noise_of(input_noise, columns),
+        input_noise=errors,
+        output_noise=[known.get(name, np.nan) for name in outputs] if known else [],
+        cutoff=(signals.cutoff or 0.0) if signals is not None else 0.0,
         measured=np.ascontiguousarray(values),
         predict=predict,
         jacobian=derivatives_of(jacobian, kind, question, parameters[1]),
@@ -234,6 +246,7 @@ def discover(
     order: str = "",
     time: Any = None,
     groups: Any = None,
+    signals: Signals | None = None,
     input_noise: Mapping[str, float] | str | None = None,
     only: Any = (),
     without: Any = (),
@@ -269,9 +282,13 @@ def discover(
         noise that is alike in neighbouring rows is no evidence. Smooth inputs are taken for a log without it.
     groups : n labels
         The recording that each row is of; with ``time``.
+    signals : Signals
+        What :func:`llmt.signals` made ``inputs`` and ``measured`` of, in the place of ``time`` and ``groups``: the noise
+        of each column is known then, which bounds the answer "nothing is missing", and the simulation is filtered as
+        the measured outputs were.
     input_noise : dict or "auto"
-        Standard deviations of the errors of inputs, or "auto": from neighbouring rows. By default "auto" for rows in
-        time, else none.
+        Standard deviations of the errors of inputs, or "auto": from neighbouring rows. By default those of ``signals``,
+        else "auto" for rows in time, else none.
     only, without : str or list of str
         Families of built-in terms to try alone, or to leave out.
     terms : dict
@@ -309,6 +326,7 @@ def discover(
         order=order,
         time=time,
         groups=groups,
+        signals=signals,
         input_noise=input_noise,
         only=only,
         without=without,
@@ -329,6 +347,7 @@ def find_missing(
     order: str = "",
     time: Any = None,
     groups: Any = None,
+    signals: Signals | None = None,
     input_noise: Mapping[str, float] | str | None = None,
     only: Any = (),
     without: Any = (),
@@ -353,6 +372,7 @@ def find_missing(
         order=order,
         time=time,
         groups=groups,
+        signals=signals,
         input_noise=input_noise,
         only=only,
         without=without,

@@ -46,6 +46,11 @@ class Signals(Result):
         noise: dict[str, float] = self._data["noise"]
         return noise
 
+    @property
+    def cutoff(self) -> float | None:
+        """Of the filter, in Hz, if the rows are dense enough to filter a simulation alike; else None."""
+        return self._data["cutoff_hz"] if self._data["dense"] else None
+
     def _html_tables(self) -> list[str]:
         in_log = self._data["noise_in_log"]
         return [
@@ -102,6 +107,7 @@ def signals(
     rate: float | None = None,
     standstill: float | Sequence[float] | None = None,
     every: int | None = None,
+    independent: bool = False,
     group: str = "",
     keep: str | Sequence[str] = (),
 ) -> Signals:
@@ -124,9 +130,13 @@ def signals(
     rate : float
         Samples per second, instead of ``time``; the time is then called ``t``.
     standstill : float or list of float
-        Rows below this speed of a position are left out, 0: none. By default found from the noise and the filter.
+        Rows below this speed of a position are left out, 0: none. By default none are; with ``independent`` the speed is
+        found from the noise and the filter.
     every : int
-        Samples from one row to the next. By default as many as make white noise of the log independent.
+        Samples from one row to the next. By default a sixth of those that make white noise of the log independent, so
+        that :func:`llmt.discover` can filter a simulation at these rows alike (``signals`` of it).
+    independent : bool
+        Rows whose noise is independent, without standstill and reversals: for a least squares fit of your own.
     group : str
         Column that says which run a row belongs to.
     keep : str or list of str
@@ -182,11 +192,12 @@ def signals(
         cutoff=number("cutoff", cutoff, 5e-324, 1e300),
         standstill=given,
         every=0 if every is None else number("every", every, 1, 2**31, whole=True),
+        independent=bool(independent),
     )
     taken = made["rows"]
     whole: dict[str, Any] = {}
     values = iter(made["values"].T)
-    for name in made["names"]:
+    for name in made["names"][: len(made["names"]) - len(made["constants"])]:
         if name == group or name in kept:
             whole[name] = np.array([columns[name][row] for row in taken])
         else:

@@ -63,7 +63,7 @@ std::string table_of_noise(const SignalsSummary& summary, std::size_t width) {
 
 }  // namespace
 
-std::vector<std::string> signal_names(const LogColumns& columns) {
+std::vector<std::string> signal_names(const LogColumns& columns, bool dense) {
   std::vector<std::string> names;
   std::map<std::string, std::string> origins;
   const auto add = [&](const std::string& name, const std::string& origin) {
@@ -81,6 +81,13 @@ std::vector<std::string> signal_names(const LogColumns& columns) {
   for (const std::string& name : columns.positions) add("dd" + name, fmt::format("the acceleration of \"{}\"", name));
   for (const std::string& name : columns.torques) add(name, "a torque");
   for (const std::string& name : columns.kept) add(name, "a column to keep");
+  for (const char* derivative : {"", "d", "dd"}) {
+    for (const std::string& name : columns.positions) {
+      add(noise_column(derivative + name), fmt::format("the noise of \"{}{}\"", derivative, name));
+    }
+  }
+  for (const std::string& name : columns.torques) add(noise_column(name), fmt::format("the noise of \"{}\"", name));
+  if (dense) add(cutoff_column, "the cutoff of the filter");
   return names;
 }
 
@@ -89,6 +96,21 @@ Eigen::MatrixXd signal_values(const discovery::Signals& signals) {
   Eigen::MatrixXd values(signals.time.size(), 1 + 3 * p + signals.torques.cols());
   values << signals.time, signals.positions, signals.velocities, signals.accelerations, signals.torques;
   return values;
+}
+
+Eigen::VectorXd signal_constants(const SignalsSummary& summary) {
+  const discovery::Signals& signals = summary.signals;
+  const auto p = std::ssize(signals.position_noise);
+  const auto k = std::ssize(signals.torque_noise);
+  Eigen::VectorXd noise(3 * p + k + (signals.dense ? 1 : 0));
+  if (signals.dense) noise(3 * p + k) = summary.cutoff;
+  for (Eigen::Index j = 0; j < p; ++j) {
+    noise(j) = signals.position_noise[j].in_table;
+    noise(p + j) = signals.position_noise[j].of_velocity;
+    noise(2 * p + j) = signals.position_noise[j].of_acceleration;
+  }
+  for (Eigen::Index j = 0; j < k; ++j) noise(3 * p + j) = signals.torque_noise[j].in_table;
+  return noise;
 }
 
 std::string signals_text(const SignalsSummary& summary, std::size_t width) {
@@ -121,11 +143,11 @@ std::string signals_text(const SignalsSummary& summary, std::size_t width) {
                                 summary.counted + "s", first_names(unused)));
   }
   lines.push_back(
-      fmt::format("Rows: {} apart, one of {}; white noise of the log correlates by {} between "
-                  "neighbours.",
+      fmt::format("Rows: {} apart, one of {}; white noise of the log correlates by {} between neighbours.{}",
                   with_unit(static_cast<double>(signals.every) * signals.step),
-                  counted(signals.every, "sample", "samples"), number(signals.correlation, 2)));
-  const std::string standstill = sentence_of_standstill(summary);
+                  counted(signals.every, "sample", "samples"), number(signals.correlation, 2),
+                  signals.dense ? " `llmt discover` filters the simulation at these rows in the same way." : ""));
+  const std::string standstill = signals.dense ? "" : sentence_of_standstill(summary);
   if (!standstill.empty()) lines.push_back(standstill);
   if (!summary.table.empty()) lines.push_back(fmt::format("Written to {}.", summary.table));
   std::string text;
@@ -152,6 +174,7 @@ Json signals_json(const SignalsSummary& summary) {
   json["every"] = signals.every;
   json["step_s"] = static_cast<double>(signals.every) * signals.step;
   json["neighbour_correlation"] = signals.correlation;
+  json["dense"] = signals.dense;
   json["standstill_rows"] = signals.standing;
   json["reversal_s"] = signals.lobe;
   Json standstill = Json::object();
@@ -169,7 +192,7 @@ Json signals_json(const SignalsSummary& summary) {
     run["rows"] = stretch.kept;
     json["runs"].push_back(run);
   }
-  json["columns"] = signal_names(summary.columns);
+  json["columns"] = signal_names(summary.columns, signals.dense);
   Json noise = Json::object();
   Json noise_in_log = Json::object();
   for (std::size_t j = 0; j < signals.position_noise.size(); ++j) {

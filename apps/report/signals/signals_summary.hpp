@@ -32,13 +32,24 @@ struct SignalsSummary {
   discovery::Signals signals;
 };
 
-/// Names of the columns of the table, in its order: the group, time, positions, velocities (d + position),
-/// accelerations (dd + position), torques, and what is kept. Throws std::invalid_argument for a name that comes twice,
-/// saying which column it is made from.
-std::vector<std::string> signal_names(const LogColumns& columns);
+/// The column that says the noise of another one.
+inline std::string noise_column(const std::string& name) { return "noise_" + name; }
 
-/// The columns with numbers, without group and kept ones.
+/// The column that says the cutoff of the filter, of rows that are dense enough to filter a simulation alike.
+inline constexpr const char* cutoff_column = "cutoff_hz";
+
+/// Names of the columns of the table, in its order: the group, time, positions, velocities (d + position),
+/// accelerations (dd + position), torques, what is kept, and, the same in all rows, the noise of each ("noise_" + its
+/// name) and, with `dense`, the cutoff. Throws std::invalid_argument for a name that comes twice, saying which column
+/// it is made from.
+std::vector<std::string> signal_names(const LogColumns& columns, bool dense);
+
+/// The columns with numbers, without group, kept ones and noise.
 Eigen::MatrixXd signal_values(const discovery::Signals& signals);
+
+/// What is the same in all rows: standard deviations of the noise of positions, velocities, accelerations and torques
+/// of the table, in this order, and the cutoff of dense rows.
+Eigen::VectorXd signal_constants(const SignalsSummary& summary);
 
 std::string signals_text(const SignalsSummary& summary, std::size_t width = no_width_limit);
 Json signals_json(const SignalsSummary& summary);

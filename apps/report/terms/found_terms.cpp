@@ -127,14 +127,16 @@ Eigen::VectorXd inner_state(const FoundTerms& found, const FoundTerms::Term& ter
   check_times(found, term, inputs);
   const std::vector<std::string> names = found.output_names();
   for (const discovery::ModelTerm& known : discovery::inner_state_terms(inputs, outputs, names)) {
-    const auto coefficients = std::ssize(known.coefficients);
+    const auto coefficients = known.whole ? 0 : std::ssize(known.coefficients);
     const auto constants = std::ssize(known.constants);
     const bool is_this = known.family == term.family && known.location == term.location &&
                          known.output == names[term.output] && std::ssize(term.values) == coefficients + constants;
     if (!is_this) continue;
     const Eigen::VectorXd base = outputs.col(static_cast<Eigen::Index>(term.output));
     const Eigen::Map<const Eigen::VectorXd> values(term.values.data(), coefficients + constants);
-    return known.columns(discovery::rows_of(inputs, base), values.tail(constants)) * values.head(coefficients);
+    const Eigen::MatrixXd columns = known.columns(discovery::rows_of(inputs, base), values.tail(constants));
+    return known.whole ? Eigen::VectorXd(columns.rowwise().sum())
+                       : Eigen::VectorXd(columns * values.head(coefficients));
   }
   throw std::runtime_error(
       fmt::format("{}: the term {} depends on the past and cannot be computed at these rows: it needs 60 rows or more, "

@@ -87,6 +87,16 @@ std::string inner_state_text(const discovery::Missing& missing) {
   return text + ". It would be seen in " + shown_by;
 }
 
+// "undecided: what is left of u is 148 times its noise, and no term tried explains it".
+std::string undecided_text(const discovery::Missing& missing) {
+  const auto times = [](const discovery::Gap& gap) {
+    return gap.known_noise > 0.0 ? gap.after / gap.known_noise : 0.0;
+  };
+  const auto most = std::ranges::max_element(missing.gaps, {}, times);
+  return fmt::format("undecided: what is left of {} is {:.3g} times its noise, and no term tried explains it",
+                     most->output, times(*most));
+}
+
 }  // namespace
 
 std::string headline(const discovery::Missing& missing) {
@@ -119,6 +129,8 @@ std::string headline(const discovery::Missing& missing) {
       return "nothing is missing, but " + changed_parameters(missing);
     case discovery::Answer::inner_state:
       return inner_state_text(missing);
+    case discovery::Answer::undecided:
+      return undecided_text(missing);
   }
   return "";
 }

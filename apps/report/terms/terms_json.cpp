@@ -53,6 +53,20 @@ Json expression_json(const discovery::FoundTerm& found, const TermsSummary& summ
   return text;
 }
 
+// "q" of "q where T > c".
+std::string place_without_regime(const std::string& location) {
+  const std::size_t end = location.find("where ");
+  return location.substr(0, end == 0 ? 0 : end - 1);
+}
+
+// Where a term acts alone; null if everywhere.
+Json regime_json(const discovery::FoundTerm& found) {
+  if (found.regime.empty()) return nullptr;
+  return {{"input", found.regime},
+          {"threshold", found.constants(0)},
+          {"acts", found.location.ends_with("> c") ? "above" : "below"}};
+}
+
 Json found_json(const discovery::FoundTerm& found, const TermsSummary& summary, const Words& words) {
   Json parameters = Json::array();
   for (const discovery::TermValue& value : found.values) {
@@ -68,9 +82,10 @@ Json found_json(const discovery::FoundTerm& found, const TermsSummary& summary, 
     exact = exact || rival.exact;
   }
   Json json = {{"name", found.family},
-               {"location", found.location},
+               {"location", found.regime.empty() ? found.location : place_without_regime(found.location)},
                {"output", found.output},
                {"formula", found.formula},
+               {"regime", regime_json(found)},
                {"expression", expression_json(found, summary, words)},
                {"parameters", parameters},
                {"rivals", rivals},
@@ -152,6 +167,7 @@ Json gap_json(const discovery::Missing& missing) {
                     {"before", finite_or_null(gap.before)},
                     {"after", finite_or_null(gap.after)},
                     {"noise_floor", finite_or_null(gap.noise_floor)},
+                    {"known_noise", finite_or_null(gap.known_noise)},
                     {"outliers", gap.outliers},
                     {"nominal", finite_or_null(gap.nominal)}});
   }

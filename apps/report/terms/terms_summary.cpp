@@ -31,7 +31,7 @@ std::string found_text(const Missing& missing) {
       continue;
     }
     // Formulas of several coefficients name them.
-    const std::string factor = found.coefficients.size() == 1 ? found.values.front().name + " * " : "";
+    const std::string factor = found.coefficients.size() == 1 && !found.whole ? found.values.front().name + " * " : "";
     text += fmt::format("   add to {}: {}{}\n", found.output, factor, found.formula);
     for (const discovery::TermValue& value : found.values) text += "   " + value_text(value) + "\n";
     if (found.coefficients.size() == 2 && found.values.front().name == "C") {

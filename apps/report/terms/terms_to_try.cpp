@@ -9,6 +9,7 @@ std::vector<discovery::ModelTerm> library_terms(const discovery::Inputs& inputs,
                                                 const std::vector<std::string>& outputs,
                                                 std::vector<discovery::UntestableCause>& untestable) {
   std::vector<discovery::ModelTerm> library = discovery::standard_terms(inputs, &untestable);
+  std::ranges::move(discovery::regime_terms(inputs, library), std::back_inserter(library));
   std::ranges::move(discovery::inner_state_terms(inputs, simulated, outputs), std::back_inserter(library));
   return library;
 }

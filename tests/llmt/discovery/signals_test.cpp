@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "discovery/signals/kernel.hpp"
 #include "llmt/random.hpp"
 
 namespace signals_test {
@@ -107,6 +108,7 @@ TEST(Signals, WhiteNoiseHasTheVarianceOfTheEquation) {
   const auto noise = [&](double) { return 1e-3 * random.normal(); };
   SignalsOptions options = all_rows;
   options.standstill = {};  // nothing moves: no row is left out
+  options.independent = true;
   const Signals table = signals(log_of(100000, 500.0, noise, noise), options);
   EXPECT_FALSE(table.moves[0]);
   EXPECT_EQ(table.standing, 0);
@@ -150,7 +152,7 @@ TEST(Signals, RowsAtStandstillAndReversalAreLeftOut) {
     return (t < 5.0 ? 1.0 - std::cos(2.0 * pi * 0.8 * t) : 0.0) + 1e-5 * random.normal();
   };
   const Log log = log_of(5000, 500.0, moves_and_rests, moves_and_rests);
-  const Signals table = signals(log, {.cutoff = 10.0});
+  const Signals table = signals(log, {.cutoff = 10.0, .independent = true});
   ASSERT_TRUE(table.moves[0]);
   EXPECT_GT(table.lobe, 0.0);
   EXPECT_NEAR(table.standstill[0], 4.0 * table.position_noise[0].of_velocity, 1e-12);
@@ -167,12 +169,29 @@ TEST(Signals, RowsAtStandstillAndReversalAreLeftOut) {
   EXPECT_EQ(given.lobe, 0.0);
 }
 
+// Filtered at the dense rows again, a cosine has the gain of the filter once more, and white noise in them is that of
+// the whole log.
+TEST(Signals, RowsAreDenseEnoughToFilterASimulationAlike) {
+  const double width = width_for(10.0);
+  const auto position = [](double t) { return std::cos(2.0 * pi * 4.0 * t); };
+  const Signals dense = signals(log_of(5000, 500.0, position, position), {.cutoff = 10.0});
+  const Signals independent = signals(log_of(5000, 500.0, position, position), {.cutoff = 10.0, .independent = true});
+  EXPECT_TRUE(dense.dense);
+  EXPECT_FALSE(independent.dense);
+  EXPECT_EQ(dense.standing, 0);
+  EXPECT_EQ(dense.every, independent.every / 6);
+  const Eigen::VectorXd weights = low_pass(10.0, static_cast<double>(dense.every) * dense.step);
+  const Eigen::Index middle = dense.time.size() / 2;
+  const double filtered = weights.dot(dense.positions.col(0).segment(middle - weights.size() / 2, weights.size()));
+  EXPECT_NEAR(filtered, gain_of(4.0, width) * dense.positions(middle, 0), 1e-4);
+}
+
 TEST(Signals, APositionThatNeverMovesLeavesNothingOut) {
   Log log = log_of(
       5000, 500.0, [](double t) { return std::sin(t); }, [](double) { return 1.0; });
   log.positions.conservativeResize(Eigen::NoChange, 2);
   log.positions.col(1).setConstant(1.3);
-  const Signals table = signals(log, {.cutoff = 10.0});
+  const Signals table = signals(log, {.cutoff = 10.0, .independent = true});
   EXPECT_TRUE(table.moves[0]);
   EXPECT_FALSE(table.moves[1]);
   EXPECT_GT(table.time.size(), 100);

@@ -92,7 +92,8 @@ TEST(InTime, MeansOfASineKeepTheShareOfTheClosedForm) {
     // Dirichlet kernel: the amplitude of a mean over L rows is sin(pi L / P) / (L sin(pi / P)).
     const double amplitude =
         std::sin(std::numbers::pi * length / period) / (length * std::sin(std::numbers::pi / period));
-    EXPECT_NEAR(share_kept(sine, blocks(n, length)), amplitude * amplitude, 0.01) << period;
+    EXPECT_NEAR(share_kept(sine, means(sine, blocks(n, length)), blocks(n, length)), amplitude * amplitude, 0.01)
+        << period;
   }
 }
 

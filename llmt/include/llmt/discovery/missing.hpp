@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -37,6 +38,8 @@ class RandomSimulation : public std::invalid_argument {
 struct MeasuredOutputs {
   std::vector<std::string> names;  ///< d
   Eigen::MatrixXd values;          ///< n x d, beside Inputs::values
+  /// d standard deviations of the noise of a row, as signals() knows them (NaN: not known), or empty: none is known.
+  Eigen::VectorXd noise = {};
 };
 
 struct MissingOptions {
@@ -77,11 +80,13 @@ struct FoundTerm {
   Eigen::Index output_index = 0;
   Eigen::VectorXd coefficients;
   Eigen::VectorXd constants;
-  std::vector<TermValue> values;  ///< coefficients, then constants
+  bool whole = false;             ///< ModelTerm::whole
+  std::vector<TermValue> values;  ///< coefficients (not those of a whole term), then constants
   std::vector<std::string> code;  ///< ModelTerm::code
   std::vector<RivalTerms> rivals;
   double share = 0.0;       ///< of the explained sum of squares that goes with it alone
   std::string inner_state;  ///< ModelTerm::inner_state
+  std::string regime;       ///< ModelTerm::regime
   std::string shown_by;     ///< ModelTerm::shown_by
   /// The error on the samples set aside is smaller with it than without; true if there are none.
   bool shrinks_gap = true;
@@ -111,6 +116,9 @@ struct Gap {
   double noise_floor = 0.0;   ///< of the noise, from repeats where there are enough, else from what is left
   Eigen::Index outliers = 0;  ///< rows set aside that deviate by more than 5 noise floors both before and after
   double nominal = 0.0;       ///< the simulation as it was given, at the nominal values of its parameters
+  /// Of the samples, from MeasuredOutputs::noise and from what errors of the inputs do to the simulation; NaN: not
+  /// known.
+  double known_noise = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// What the rows say about a free parameter of the simulation, or about a sum of several that they cannot tell apart.

@@ -44,6 +44,8 @@ struct ModelTerm {
   std::string formula;                    ///< for people: "a^2"
   std::vector<std::string> inputs;        ///< what it depends on
   std::vector<std::string> coefficients;  ///< k names
+  /// The coefficients are 1 and are not fitted; its constants are its unknowns, as of a delay: s(t - delay) - s(t).
+  bool whole = false;
   std::string per = {};  ///< a coefficient is in units of the output by this, "a^2"; empty: in those of the output
   /// n x k. Called as Simulation::predict is.
   std::function<Eigen::MatrixXd(const Rows& rows, const Eigen::VectorXd& constants)> columns;
@@ -53,7 +55,10 @@ struct ModelTerm {
   bool history = false;  ///< depends on earlier rows: tried only beside what rows explain by themselves
   /// "a delay or a first-order lag": the term stands for a state that the inputs do not show. Empty: it does not.
   std::string inner_state = {};
-  std::string shown_by = {};   ///< the signal that would show that state
+  std::string shown_by = {};  ///< the signal that would show that state
+  /// The input beyond whose threshold the term acts, and is zero elsewhere. Tried only where the other terms leave
+  /// something. Empty: it acts everywhere.
+  std::string regime = {};
   std::string unit = {};       ///< of the first coefficient; empty: that of the output by `per`, of all
   Eigen::VectorXd lower = {};  ///< k plausible limits of the coefficients, or empty: none
   Eigen::VectorXd upper = {};
@@ -79,6 +84,9 @@ struct Inputs {
   /// p standard deviations of the errors of the inputs (0: none; NaN: estimated from rows in time). Empty: NaN for rows
   /// in time, else 0.
   Eigen::VectorXd noise = {};
+  /// Of the low pass of signals() that the measured outputs went through, per unit of the instants; the simulation and
+  /// the terms then go through it too, which needs rows at even steps of at most half of an independent one. 0: none.
+  double cutoff = 0.0;
   /// p zero bands: where |x| is below, the input is at rest and counts as 0 in terms (Karnopp 1985). Empty: none; for
   /// rows in time find_missing() looks for them.
   Eigen::VectorXd zero_bands = {};

@@ -20,7 +20,11 @@ struct SignalsOptions {
   /// Speed up to which a position stands still: one value for all or one each. Empty: found from the noise and the
   /// filter.
   std::vector<double> standstill{};
-  Eigen::Index every = 0;  ///< samples from one row kept to the next; 0: as many as make their noise independent
+  /// Samples from one row kept to the next. 0: rows are six times as dense as rows of independent noise, so that a
+  /// simulation at these rows can be filtered alike, see Inputs::cutoff; or as dense, with `independent`.
+  Eigen::Index every = 0;
+  /// Rows whose noise is independent, without standstill and reversals: for a least squares fit of one's own.
+  bool independent = false;
 };
 
 /// A part of the log without a gap.
@@ -57,6 +61,7 @@ struct Signals {
   double lobe = 0.0;               ///< in s: time to a reversal within which a row is left out; 0: not considered
   Eigen::Index ends_cut = 0;       ///< samples at the ends of stretches
   Eigen::Index standing = 0;       ///< rows that were left out because a position stands still or reverses
+  bool dense = false;              ///< a simulation at these rows can be filtered as the torques were
   bool resampled = false;          ///< samples were not equally spaced, and were interpolated
   std::vector<ColumnNoise> position_noise;  ///< p
   std::vector<ColumnNoise> torque_noise;    ///< k; derivatives are 0
@@ -75,9 +80,13 @@ struct Signals {
 /// Times: steps that differ are interpolated (cubic) at the median step, unless times that were rounded explain them.
 /// A step of more than 2.5 median steps is a gap; a gap and a new run end a stretch, and no filter reaches across.
 ///
-/// Standstill: a row is left out where a speed is at most 4 standard deviations of its noise, so that its sign is not
-/// known, or at most acceleration x 0.43 / cutoff, so that it reverses within the main lobe of the filter, which rounds
-/// whatever jumps there. Positions that never move (never faster than 5 times that speed) leave nothing out.
+/// Dense rows hold reversals and standstill. A model that jumps there, as dry friction does, is to be compared with the
+/// torques after it went through the same filter, as find_missing() does with Inputs::cutoff.
+///
+/// Standstill, with `independent` or where speeds are given: a row is left out where a speed is at most 4 standard
+/// deviations of its noise, so that its sign is not known, or at most acceleration x 0.43 / cutoff, so that it reverses
+/// within the main lobe of the filter, which rounds whatever jumps there. Positions that never move (never faster than
+/// 5 times that speed) leave nothing out.
 ///
 /// Throws LogError for wrong shapes, values that are not finite, a cutoff that is not above 0 or above a quarter of the
 /// sampling rate, times that do not increase within a run, a run that is there twice, more than a tenth of the steps

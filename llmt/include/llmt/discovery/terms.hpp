@@ -54,8 +54,8 @@ std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<Untestab
 /// that there is not.
 std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string& input);
 /// Terms that stand for a state which the inputs do not show, for rows in the order of time (Rows::instants):
-///   delay -delay ds/dt of the simulated output s: of a pure delay y(t) = s(t - delay) and of a first-order lag
-///   s = y + delay dy/dt, which are the same to first order;
+///   delay s(t - delay) - s(t) of the simulated output s, of either sign: a command comes before the torque. A
+///   first-order lag s = y + delay dy/dt is the same to first order. It has no coefficient (ModelTerm::whole);
 ///   drive_spring, for inputs that are a position q, its speed v and its acceleration a (found out): the inputs are
 ///   measured in front of a spring of rate k, and the load is at q - w/k, where w = y - J a - b v is what the spring
 ///   carries, J and b the inertia and damping in front of it. To first order, for which y is s,
@@ -69,6 +69,11 @@ std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string&
 /// table. `simulated` n x d. Empty for less than 60 rows. Throws as standard_terms().
 std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::MatrixXd& simulated,
                                          const std::vector<std::string>& outputs);
+
+/// Effects that act in a regime alone: each term of `library` of at most the complexity of a product, without a
+/// constant of its own, times [x > c] or [x <= c] for every input x; the threshold c is searched, first among 20
+/// quantiles. Location: "q where x > c".
+std::vector<ModelTerm> regime_terms(const Inputs& inputs, const std::vector<ModelTerm>& library);
 
 /// `library` without the terms of one column that are proportional to one of `own`, so that the user's name is used.
 std::vector<ModelTerm> without_duplicates(std::vector<ModelTerm> library, const std::vector<ModelTerm>& own,

@@ -197,6 +197,8 @@ std::string to_string(Answer answer) {
       return "parameters only";
     case Answer::inner_state:
       return "an inner state";
+    case Answer::undecided:
+      return "undecided";
   }
   return "";
 }

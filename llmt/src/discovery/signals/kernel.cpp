@@ -72,6 +72,16 @@ Kernel kernel_of(double cutoff, double step) {
   return kernel;
 }
 
+Eigen::VectorXd low_pass(double cutoff, double step) {
+  constexpr double near = 5.0;  // beyond it is a thousandth of the kernel
+  const double width = width_of(cutoff);
+  const auto half = static_cast<Eigen::Index>(std::floor(near * width / step));
+  Eigen::VectorXd weights(2 * half + 1);
+  for (Eigen::Index k = -half; k <= half; ++k)
+    weights(half + k) = kernel_value(static_cast<double>(k) * step / width, 0);
+  return weights / weights.sum();
+}
+
 double correlation_at(const Kernel& kernel, Eigen::Index lag) {
   const auto value = kernel.weights.col(0);
   const Eigen::Index shared = value.size() - lag;

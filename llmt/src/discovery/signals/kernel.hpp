@@ -24,6 +24,9 @@ Eigen::Index independent_step(double cutoff, double step);
 
 Kernel kernel_of(double cutoff, double step);
 
+/// The kernel up to 5 widths, for rows `step` apart; 2 h + 1 weights that add up to 1.
+Eigen::VectorXd low_pass(double cutoff, double step);
+
 /// Correlation of filtered white noise at a distance of `lag` samples.
 double correlation_at(const Kernel& kernel, Eigen::Index lag);
 

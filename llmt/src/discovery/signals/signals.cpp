@@ -148,7 +148,13 @@ Signals signals(const Log& log, const SignalsOptions& options) {
 
   Signals signals;
   signals.step = timing.step;
-  signals.every = options.every > 0 ? options.every : independent_step(options.cutoff, timing.step);
+  constexpr Eigen::Index denser = 6;
+  const Eigen::Index independent = independent_step(options.cutoff, timing.step);
+  const bool drops = options.independent || !options.standstill.empty();
+  signals.every = options.every > 0 ? options.every
+                  : drops           ? independent
+                                    : std::max<Eigen::Index>(1, independent / denser);
+  signals.dense = !drops && 2 * signals.every <= independent;
   const Eigen::Index half = half_length(options.cutoff, timing.step);
   signals.half_length = static_cast<double>(half) * timing.step;
   const auto longest = std::ranges::max(timing.parts, {}, [](const Part& part) { return part.last - part.first; });
@@ -184,8 +190,10 @@ Signals signals(const Log& log, const SignalsOptions& options) {
     noise.push_back(noise_of(std::move(variances[c]), kernel, 1e-15 * largest, c < positions));
   }
   set_standstill(signals, options, log, rows, kernel);
-  signals.standing =
-      static_cast<Eigen::Index>(std::erase_if(rows, [&](const Filtered& row) { return stands(signals, row); }));
+  if (drops) {
+    signals.standing =
+        static_cast<Eigen::Index>(std::erase_if(rows, [&](const Filtered& row) { return stands(signals, row); }));
+  }
   if (rows.empty()) throw LogError("no row is left: a position stands still or reverses in all of them", -1);
   fill(signals, rows, positions);
   return signals;

@@ -29,7 +29,7 @@ bool is_share_of_the_simulation(const std::string& family) {
   return family == "gain" || family == "gain_curvature" || family == "load_friction";
 }
 
-bool is_gain(const FoundTerm& term) { return is_share_of_the_simulation(term.family); }
+bool is_gain(const FoundTerm& term) { return is_share_of_the_simulation(term.family) && term.regime.empty(); }
 
 Eigen::Index fitted_numbers(const Missing& missing) {
   Eigen::Index count = 0;
@@ -116,9 +116,34 @@ bool has_gain(const Missing& missing) { return std::ranges::any_of(missing.found
 std::set<std::size_t> shares_of_the_simulation(const std::vector<ModelTerm>& terms) {
   std::set<std::size_t> shares;
   for (std::size_t t = 0; t < terms.size(); ++t) {
-    if (is_share_of_the_simulation(terms[t].family)) shares.insert(t);
+    if (is_share_of_the_simulation(terms[t].family) && terms[t].regime.empty()) shares.insert(t);
   }
   return shares;
+}
+
+std::set<std::size_t> terms_of_regimes(const std::vector<ModelTerm>& terms) {
+  std::set<std::size_t> regimes;
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (!terms[t].regime.empty()) regimes.insert(t);
+  }
+  return regimes;
+}
+
+bool leaves_something(const Missing& missing) {
+  constexpr double alike = 0.5;  // independent share
+  constexpr double as_noise = 2.0;
+  const auto is_noise = [&](const Gap& gap) { return gap.after <= as_noise * gap.known_noise; };
+  if (missing.answer == Answer::inner_state || std::ranges::all_of(missing.gaps, is_noise)) return false;
+  if (missing.time.in_time && missing.time.independent_share < alike) return true;
+  return missing.answer == Answer::unknown || missing.answer == Answer::undecided ||
+         missing.answer == Answer::failed_held_out || !missing.structure.empty();
+}
+
+Missing regimes_for_unknown(Missing found, Missing of_regimes) {
+  const bool holds = (of_regimes.answer == Answer::named || of_regimes.answer == Answer::indistinguishable) &&
+                     std::ranges::any_of(of_regimes.found, [](const FoundTerm& term) { return !term.regime.empty(); });
+  if (!holds) return found;
+  return left_on_held_out(of_regimes, found) < clearly_less * left_on_held_out(found, found) ? of_regimes : found;
 }
 
 Missing inputs_for_gain(Missing found, Missing of_inputs, const MeasuredOutputs& measured, double rival_margin) {

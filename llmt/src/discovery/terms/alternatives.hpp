@@ -64,6 +64,17 @@ bool has_gain(const Missing& missing);
 /// The indices of terms that are a share of the simulated output.
 std::set<std::size_t> shares_of_the_simulation(const std::vector<ModelTerm>& terms);
 
+/// The indices of terms that act in a regime alone.
+std::set<std::size_t> terms_of_regimes(const std::vector<ModelTerm>& terms);
+
+/// Whether something is left that no term without a regime explains: more than twice the noise, as far as that is
+/// known, and the answer says so, or what is left is alike in neighbouring rows.
+bool leaves_something(const Missing& missing);
+
+/// An answer with terms of regimes in the place of one that leaves something, where it holds and leaves less than 80 %
+/// of the squares on the rows set aside.
+Missing regimes_for_unknown(Missing found, Missing of_regimes);
+
 /// Changes of an inertia and of friction together change the output by almost a share of it, and so do changes of all
 /// free parameters. `of_inputs` is the answer without shares. Where it explains as well on the rows set aside, by the
 /// margin of a rival: if it has fewer terms, it is the answer, and otherwise those that stand in the place of a gain

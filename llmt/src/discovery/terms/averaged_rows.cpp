@@ -35,15 +35,16 @@ Eigen::MatrixXd spread_out(const Eigen::MatrixXd& of_blocks, const Samples& bloc
 std::optional<AveragedRows> averaged(const Inputs& inputs, const MeasuredOutputs& measured,
                                      const MissingOptions& options, Eigen::Index most) {
   const Eigen::Index n = inputs.values.rows();
-  const bool has_given_noise = (inputs.noise.array() > 0.0).any();
-  if (inputs.instants.size() == 0 || n < 2 * most || has_given_noise) return std::nullopt;
+  if (inputs.instants.size() == 0 || inputs.cutoff > 0.0 || n < 2 * most) return std::nullopt;
   constexpr Eigen::Index share_of_a_sample = 12;
   const Eigen::Index length = std::min(n / most, bearable_block(inputs, options) / share_of_a_sample);
   if (length < 2) return std::nullopt;
   AveragedRows few{inputs, measured, blocks_in_time(inputs, length)};
   few.inputs.values = means(inputs.values, few.blocks);
   few.inputs.instants = means(inputs.instants, few.blocks);
+  few.inputs.noise /= std::sqrt(static_cast<double>(length));
   few.measured.values = means(measured.values, few.blocks);
+  few.measured.noise /= std::sqrt(static_cast<double>(length));
   few.inputs.runs.clear();
   for (Eigen::Index b = 0; b < few.blocks.size() && !inputs.runs.empty(); ++b) {
     few.inputs.runs.push_back(inputs.runs[few.blocks.rows_of(b).front()]);

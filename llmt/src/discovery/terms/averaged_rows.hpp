@@ -20,7 +20,7 @@ struct AveragedRows {
 /// For rows in time (Inputs::instants) of which there are twice as many as `most` or more: means over as many rows as
 /// leave `most` of them, but over no more than a twelfth of what split_in_time() would average. Within these no smooth
 /// input changes by more than about 1.5 % of its standard deviation, so a term of the means is the mean of the term.
-/// Nothing where that is one row, or where standard deviations of errors are given, which are those of single rows.
+/// Nothing where that is one row.
 std::optional<AveragedRows> averaged(const Inputs& inputs, const MeasuredOutputs& measured,
                                      const MissingOptions& options, Eigen::Index most = 50000);
 

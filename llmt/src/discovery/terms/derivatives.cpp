@@ -32,8 +32,9 @@ std::vector<Recorded> recordings(const Rows& rows) {
   return all;
 }
 
-Derivatives::Derivatives(const Rows& rows, Eigen::Index half) : sequence_(rows.sequence) {
-  const std::vector<Recorded> extent = recordings(rows);
+Derivatives::Derivatives(const Rows& rows, Eigen::Index half)
+    : sequence_(rows.sequence), recorded_(recordings(rows)), times_(rows.instants(rows.sequence)) {
+  const std::vector<Recorded>& extent = recorded_;
   const auto n = std::ssize(sequence_);
   stencils_.resize(n);
   Eigen::VectorXd before;
@@ -58,7 +59,7 @@ Derivatives::Derivatives(const Rows& rows, Eigen::Index half) : sequence_(rows.s
       for (Eigen::Index q = 1; q < powers; ++q) basis.col(q) = basis.col(q - 1).cwiseProduct(times);
       // Times within -1 ... 1 and few powers: the normal equations lose few digits.
       const Eigen::MatrixXd inverse = (basis.transpose() * basis).ldlt().solve(basis.transpose());
-      weights = std::make_shared<const Eigen::MatrixXd>(inverse.middleRows(1, std::min<Eigen::Index>(2, powers - 1)));
+      weights = std::make_shared<const Eigen::MatrixXd>(inverse);
       before = times;
     }
     stencils_[k].width = width;
@@ -72,13 +73,38 @@ Eigen::VectorXd Derivatives::apply(int order, const Eigen::VectorXd& values) con
   Eigen::VectorXd weights;
   for (std::size_t k = 0; k < stencils_.size(); ++k) {
     const Stencil& own = stencils_[k];
-    if (own.weights == nullptr || own.weights->rows() < order) continue;
+    if (own.weights == nullptr || own.weights->rows() <= order) continue;
     if (order == 1) {
-      weights = own.weights->row(0).transpose() / own.width;
+      weights = own.weights->row(1).transpose() / own.width;
     } else {
-      weights = 2.0 * own.weights->row(1).transpose() / (own.width * own.width);
+      weights = 2.0 * own.weights->row(2).transpose() / (own.width * own.width);
     }
     result(sequence_[k]) = weights.dot(in_time.segment(own.begin, weights.size()));
+  }
+  return result;
+}
+
+Eigen::VectorXd Derivatives::earlier(const Eigen::VectorXd& values, double by) const {
+  const Eigen::VectorXd in_time = values(sequence_);
+  Eigen::VectorXd result = values;
+  for (Eigen::Index k = 0; k < std::ssize(stencils_); ++k) {
+    const auto begin = times_.begin() + recorded_[k].begin;
+    const auto end = times_.begin() + recorded_[k].end;
+    if (begin == end) continue;
+    const double time = std::clamp(times_(k) - by, *begin, *(end - 1));
+    auto nearest = std::lower_bound(begin, end, time);
+    if (nearest == end || (nearest != begin && time - *(nearest - 1) < *nearest - time)) --nearest;
+    const Eigen::Index place = nearest - times_.begin();
+    const Stencil& own = stencils_[place];
+    if (own.weights == nullptr) {
+      result(sequence_[k]) = in_time(place);
+      continue;
+    }
+    const Eigen::VectorXd coefficients = *own.weights * in_time.segment(own.begin, own.weights->cols());
+    const double x = (time - times_(place)) / own.width;
+    double value = 0.0;
+    for (Eigen::Index q = coefficients.size(); q-- > 0;) value = value * x + coefficients(q);
+    result(sequence_[k]) = value;
   }
   return result;
 }

@@ -33,16 +33,21 @@ class Derivatives {
 
   Eigen::VectorXd first(const Eigen::VectorXd& values) const { return apply(1, values); }
   Eigen::VectorXd second(const Eigen::VectorXd& values) const { return apply(2, values); }
+  /// The values `by` earlier (later, if negative), on the polynomial of the row nearest to that time; beyond the ends
+  /// of a recording those at the end.
+  Eigen::VectorXd earlier(const Eigen::VectorXd& values, double by) const;
 
  private:
   // The rows in a window. Windows that are alike, as nearly all are at a constant rate, share their weights: a row for
-  // the first and one for the second coefficient of the polynomial, as far as there are any; null: none.
+  // each coefficient of the polynomial; null: none.
   struct Stencil {
     Eigen::Index begin = 0;  // place in the sequence
     double width = 1.0;      // time that is 1 for the polynomial
     std::shared_ptr<const Eigen::MatrixXd> weights;
   };
   std::vector<Eigen::Index> sequence_;
+  std::vector<Recorded> recorded_;
+  Eigen::VectorXd times_;  // of the places
   std::vector<Stencil> stencils_;
 
   Eigen::VectorXd apply(int order, const Eigen::VectorXd& values) const;

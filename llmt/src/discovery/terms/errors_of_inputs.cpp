@@ -20,7 +20,7 @@ ErrorsOfInputs errors_of_inputs(const TermModel& model, const Inputs& inputs, co
   const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
   const Eigen::MatrixXd covariance = covariance_of_errors(rows, inputs);
   if (!(covariance.diagonal().array() > 0.0).any()) return errors;
-  if (inputs.instants.size() > 0) {
+  if (inputs.instants.size() > 0 && inputs.cutoff == 0.0) {
     std::vector<bool> apart(inputs.values.rows(), false);
     for (const UnknownSign& found :
          rows_of_unknown_sign(rows, inputs, covariance, measured.values - simulated, apart)) {

@@ -27,7 +27,7 @@ std::string factor_text(double factor) {
   return (factor < 0.0 ? " - " : " + ") + (std::abs(size - 1.0) < rounding ? "" : fmt::format("{:.3g} ", size));
 }
 
-FittedParameter described(const ParameterFits& fits, const ParameterSum& sum, double z) {
+FittedParameter described(const ParameterFits& fits, const ParameterSum& sum, double false_alarm_rate) {
   const std::vector<Parameter>& parameters = fits.model.parameters();
   FittedParameter fitted;
   fitted.name = parameters[sum.first].name;
@@ -42,7 +42,7 @@ FittedParameter described(const ParameterFits& fits, const ParameterSum& sum, do
   fitted.change = fits.beside.parameters(sum.first) - fits.nominal(sum.first);
   fitted.alone = fits.alone.parameters(sum.first) - fits.nominal(sum.first);
   fitted.standard_error = fits.beside.parameter_errors(sum.first);
-  fitted.changed = std::abs(fitted.change) > z * fitted.standard_error;
+  fitted.changed = is_beyond_chance(fitted, false_alarm_rate);
   return fitted;
 }
 
@@ -113,6 +113,12 @@ DistinctParameters distinct_parameters(const Eigen::MatrixXd& jacobian, std::vec
   return distinct;
 }
 
+bool is_beyond_chance(const FittedParameter& fitted, double false_alarm_rate) {
+  const boost::math::normal_distribution<> normal;
+  const double z = boost::math::quantile(boost::math::complement(normal, 0.5 * false_alarm_rate));
+  return std::abs(fitted.change) > z * fitted.standard_error;
+}
+
 void describe_parameters(const ParameterFits& fits, const DistinctParameters& distinct, double false_alarm_rate,
                          Missing& missing) {
   for (const std::size_t k : distinct.without_effect) {
@@ -120,9 +126,7 @@ void describe_parameters(const ParameterFits& fits, const DistinctParameters& di
   }
   const std::vector<ParameterSum>& sums = distinct.sums;
   if (sums.empty()) return;
-  const boost::math::normal_distribution<> normal;
-  const double z = boost::math::quantile(boost::math::complement(normal, 0.5 * false_alarm_rate));
-  for (const ParameterSum& sum : sums) missing.fitted_parameters.push_back(described(fits, sum, z));
+  for (const ParameterSum& sum : sums) missing.fitted_parameters.push_back(described(fits, sum, false_alarm_rate));
   const auto k = static_cast<double>(sums.size());
   const auto d = static_cast<double>(fits.data.measured.cols());
   const auto n = static_cast<double>(fits.data.measured.rows());

@@ -28,6 +28,9 @@ struct DistinctParameters {
 /// zero is no longer free and has no effect. A parameter that is known beforehand (prior_sigma) is determined by that.
 DistinctParameters distinct_parameters(const Eigen::MatrixXd& jacobian, std::vector<Parameter>& parameters);
 
+/// Whether the change is farther from zero than noise takes it with the probability `false_alarm_rate`.
+bool is_beyond_chance(const FittedParameter& fitted, double false_alarm_rate);
+
 /// The fits of a simulation that are compared.
 struct ParameterFits {
   const TermModel& model;

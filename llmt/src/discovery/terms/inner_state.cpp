@@ -17,15 +17,18 @@
 namespace llmt::discovery {
 namespace {
 
-// Derivatives at the rows that terms are evaluated on, which are the same in nearly every call.
+// Derivatives at the rows that terms are evaluated on, which are the same in nearly every call. Over windows in which
+// no signal changes much, or, where `interpolates`, on the polynomial through five rows.
 class OfRows {
  public:
+  explicit OfRows(bool interpolates = false) : interpolates_(interpolates) {}
+
   const Derivatives& at(const Rows& rows, const Eigen::MatrixXd& signals) {
     const bool is_known = derivatives_ && instants_.size() == rows.instants.size() && instants_ == rows.instants &&
                           sequence_ == rows.sequence;
     if (!is_known) {
       constexpr Eigen::Index lags = 2;
-      derivatives_.emplace(rows, lags * smooth_lag(rows, signals));
+      derivatives_.emplace(rows, interpolates_ ? 2 : lags * smooth_lag(rows, signals));
       instants_ = rows.instants;
       sequence_ = rows.sequence;
     }
@@ -33,24 +36,71 @@ class OfRows {
   }
 
  private:
+  bool interpolates_;
   std::optional<Derivatives> derivatives_;
   Eigen::VectorXd instants_;
   std::vector<Eigen::Index> sequence_;
 };
 
-ModelTerm delay(const std::shared_ptr<OfRows>& of_rows, const std::string& output) {
-  return {.family = "delay",
-          .location = "",
-          .formula = "-d(simulated output)/dt",
-          .inputs = {},
-          .coefficients = {"delay"},
-          .columns = [of_rows](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
-            return -of_rows->at(rows, rows.inputs).first(rows.simulated);
-          },
-          .output = output,
-          .inner_state = "a delay or a first-order lag",
-          .shown_by = "a signal measured behind the actuator, or a step of the command on the clock of the inputs",
-          .unit = "units of time"};
+// What jumps with the sign of an input has no derivatives. Dry friction is known where the speed is, so it is taken off
+// before, and moved with the sign of the input.
+struct SimulatedParts {
+  Eigen::VectorXd smooth;
+  Eigen::VectorXd jumps;
+};
+
+SimulatedParts parts_of(const Surrogate& surrogate, const Rows& rows, Eigen::Index output) {
+  // A function that does not describe the simulation knows no jumps of it.
+  constexpr double described = 0.9;
+  if (surrogate.described()(output) < described) return {rows.simulated, Eigen::VectorXd::Zero(rows.simulated.size())};
+  Eigen::VectorXd jumps = surrogate.jumps(rows.inputs).col(output);
+  return {rows.simulated - jumps, jumps};
+}
+
+// Times on both sides of zero, from a fraction of what the signals change in to many times as much.
+std::vector<double> times_around_zero(const Rows& rows) {
+  const double lag = median_step(rows) * static_cast<double>(smooth_lag(rows, rows.inputs));
+  std::vector<double> times;
+  for (const double factor : {10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.7, 0.45, 0.3, 0.2, 0.1}) {
+    times.push_back(-factor * lag);
+  }
+  for (Eigen::Index k = std::ssize(times); k-- > 0;) times.push_back(-times[k]);
+  return times;
+}
+
+ModelTerm delay(const std::shared_ptr<OfRows>& of_rows, const std::shared_ptr<const Surrogate>& surrogate,
+                const Rows& rows, bool is_dense, const std::string& output, Eigen::Index output_index) {
+  ModelTerm term;
+  term.family = "delay";
+  term.formula = "s(t - delay) - s(t), s the simulated output";
+  term.coefficients = {"share"};
+  term.whole = true;
+  if (is_dense) {
+    // Rows are so near in time that jumps are where they are.
+    const auto between = std::make_shared<OfRows>(true);
+    term.columns = [between](const Rows& own, const Eigen::VectorXd& constants) -> Eigen::MatrixXd {
+      return between->at(own, own.inputs).earlier(own.simulated, constants(0)) - own.simulated;
+    };
+  } else {
+    term.columns = [of_rows, surrogate, output_index](const Rows& own, const Eigen::VectorXd& constants) {
+      const Derivatives& derivatives = of_rows->at(own, own.inputs);
+      const SimulatedParts parts = parts_of(*surrogate, own, output_index);
+      Eigen::MatrixXd column = derivatives.earlier(parts.smooth, constants(0)) - parts.smooth;
+      if ((parts.jumps.array() != 0.0).any()) {
+        Eigen::MatrixXd earlier = own.inputs;
+        for (Eigen::Index j = 0; j < earlier.cols(); ++j) {
+          earlier.col(j) = derivatives.earlier(own.inputs.col(j), constants(0));
+        }
+        column += surrogate->jumps(earlier).col(output_index) - parts.jumps;
+      }
+      return column;
+    };
+  }
+  term.constants = {{.name = "delay", .unit = "units of time", .tried = times_around_zero(rows)}};
+  term.output = output;
+  term.inner_state = "a delay or a first-order lag";
+  term.shown_by = "a signal measured behind the actuator, or a step of the command on the clock of the inputs";
+  return term;
 }
 
 ModelTerm resonance(const std::string& output, std::vector<double> frequencies) {
@@ -102,7 +152,7 @@ ModelTerm drive_spring(const std::shared_ptr<OfRows>& of_rows, const std::shared
     const auto of_load = [&](const Eigen::ArrayXd& w) -> Eigen::ArrayXd {
       return by_position * w + by_acceleration * second(w);
     };
-    const Eigen::ArrayXd output_here = rows.simulated.array();
+    const Eigen::ArrayXd output_here = parts_of(*surrogate, rows, output_index).smooth.array();
     const Eigen::ArrayXd speed = rows.inputs.col(motion.speed).array();
     const Eigen::ArrayXd acceleration = rows.inputs.col(motion.acceleration).array();
     Eigen::MatrixXd columns(rows.inputs.rows(), 3);
@@ -154,7 +204,7 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
   constexpr double largest_noise_share = 0.3;
   for (std::size_t o = 0; o < outputs.size(); ++o) {
     const Eigen::VectorXd output = simulated.col(static_cast<Eigen::Index>(o));
-    // Nothing is measured before it happens. Compliance, inertia and damping are not negative.
+    // Compliance, inertia and damping are not negative.
     const auto limit = [&](ModelTerm& term) {
       constexpr double far = 10.0;  // times the output
       Rows here = rows;
@@ -165,8 +215,8 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
       term.lower = Eigen::VectorXd::Zero(columns.cols());
       term.upper = (far * output.norm() / columns.colwise().norm().array().max(1e-300)).matrix().transpose();
     };
-    terms.push_back(delay(of_rows, outputs[o]));
-    limit(terms.back());
+    const auto place = static_cast<Eigen::Index>(o);
+    terms.push_back(delay(of_rows, surrogate, rows, inputs.cutoff > 0.0, outputs[o], place));
     Rows here = rows;
     here.simulated = output;
     if (std::vector<double> frequencies = resonant_frequencies(here); !frequencies.empty()) {
@@ -174,11 +224,14 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
       terms.back().lower = Eigen::VectorXd::Zero(1);
       terms.back().upper = Eigen::VectorXd::Ones(1);
     }
-    if (surrogate->described()(o) < described) continue;
+    if (surrogate->described()(place) < described) continue;
     // The spring's term holds the second derivative of the simulated output, which should not be noise.
-    if (noise_of_second(of_rows->at(rows, inputs.values), rows, output) > largest_noise_share) continue;
+    if (noise_of_second(of_rows->at(rows, inputs.values), rows, parts_of(*surrogate, here, place).smooth) >
+        largest_noise_share) {
+      continue;
+    }
     for (const Motion& motion : all) {
-      terms.push_back(drive_spring(of_rows, surrogate, motion, inputs, outputs[o], static_cast<Eigen::Index>(o)));
+      terms.push_back(drive_spring(of_rows, surrogate, motion, inputs, outputs[o], place));
       limit(terms.back());
     }
   }

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "discovery/terms/derivatives.hpp"
+#include "discovery/terms/row_filter.hpp"
 #include "llmt/random.hpp"
 
 namespace llmt::discovery {
@@ -21,16 +22,24 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// Fourth differences within recordings; a row each.
-Eigen::MatrixXd fourth_differences(const Rows& rows, const Eigen::MatrixXd& values) {
+// Divided differences within recordings, a row each, weighted so that white noise has the same variance in them. Of a
+// signal of 12 rows a period those of order 8 leave 1e-4, of a slower one less: the motion is not in them.
+Eigen::MatrixXd differences_of_order(Eigen::Index order, const Rows& rows, const Eigen::MatrixXd& values) {
   const std::vector<Recorded> recorded = recordings(rows);
   const auto n = std::ssize(rows.sequence);
   Eigen::MatrixXd all(n, values.cols());
   Eigen::Index count = 0;
-  for (Eigen::Index k = 0; k + 4 < n; ++k) {
-    if (recorded[k].begin != recorded[k + 4].begin) continue;
-    const auto at = [&](Eigen::Index i) { return values.row(rows.sequence[k + i]); };
-    all.row(count++) = at(4) - 4.0 * at(3) + 6.0 * at(2) - 4.0 * at(1) + at(0);
+  for (Eigen::Index k = 0; k + order < n; ++k) {
+    if (recorded[k].begin != recorded[k + order].begin) continue;
+    const std::vector<Eigen::Index> window(rows.sequence.begin() + k, rows.sequence.begin() + k + order + 1);
+    const Eigen::ArrayXd times = rows.instants(window) / (rows.instants(window.back()) - rows.instants(window.front()));
+    Eigen::VectorXd weights(order + 1);
+    for (Eigen::Index i = 0; i <= order; ++i) {
+      double product = 1.0;
+      for (Eigen::Index j = 0; j <= order; ++j) product *= j == i ? 1.0 : times(i) - times(j);
+      weights(i) = 1.0 / product;
+    }
+    all.row(count++) = weights.normalized().transpose() * values(window, Eigen::all);
   }
   all.conservativeResize(count, Eigen::NoChange);
   return all;
@@ -51,13 +60,25 @@ bool is_fitted(const TermModel& model, const PlacedTerm& placed) {
   return !constants.empty() && constants.front().smooth;
 }
 
+// Places of what is fitted of a term among its coefficients and constants.
+std::vector<Eigen::Index> fitted_places(const TermModel& model, const PlacedTerm& placed) {
+  std::vector<Eigen::Index> places;
+  for (Eigen::Index k = 0; k < placed.coefficients.size(); ++k) {
+    if (!placed.is_held(k)) places.push_back(k);
+  }
+  if (is_fitted(model, placed)) places.push_back(placed.coefficients.size());
+  return places;
+}
+
 // Derivatives of the stacked prediction by coefficients and smooth constants of the terms.
 Eigen::MatrixXd term_jacobian(const TermModel& model, const TermData& data, const TermFit& fit) {
   const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
   std::vector<Eigen::VectorXd> columns;
   for (const PlacedTerm& placed : fit.placed) {
     const Eigen::MatrixXd signature = stacked_signature(model, data, placed, simulated);
-    for (Eigen::Index k = 0; k < signature.cols(); ++k) columns.emplace_back(signature.col(k));
+    for (Eigen::Index k = 0; k < signature.cols(); ++k) {
+      if (!placed.is_held(k)) columns.emplace_back(signature.col(k));
+    }
     if (!is_fitted(model, placed)) continue;
     const double step = 1e-3 * spacing(model.terms()[placed.term].constants.front().tried, placed.constants(0));
     PlacedTerm moved = placed;
@@ -91,13 +112,16 @@ struct InputNoise::Draw {
 };
 
 Eigen::MatrixXd noise_in_time(const Rows& rows, const Inputs& inputs) {
-  constexpr double factor = 70.0;
   constexpr double jump = 5.0;  // robust standard deviations
   constexpr double normal_median = 0.6745;
   constexpr double largest_share = 0.4;
   const Eigen::Index p = inputs.values.cols();
-  Eigen::MatrixXd differences = fourth_differences(rows, inputs.values);
   constexpr Eigen::Index fewest = 50;
+  Eigen::MatrixXd differences;
+  for (const Eigen::Index order : {8, 6, 4}) {  // short recordings have none of a high order
+    differences = differences_of_order(order, rows, inputs.values);
+    if (differences.rows() >= fewest) break;
+  }
   if (differences.rows() < fewest) return Eigen::MatrixXd::Zero(p, p);
   Eigen::VectorXd limits(p);
   for (Eigen::Index j = 0; j < p; ++j) {
@@ -112,7 +136,7 @@ Eigen::MatrixXd noise_in_time(const Rows& rows, const Inputs& inputs) {
     sum += differences.row(i).transpose() * differences.row(i);
     count += 1.0;
   }
-  Eigen::MatrixXd covariance = count > 0.0 ? Eigen::MatrixXd(sum / (factor * count)) : Eigen::MatrixXd::Zero(p, p);
+  Eigen::MatrixXd covariance = count > 0.0 ? Eigen::MatrixXd(sum / count) : Eigen::MatrixXd::Zero(p, p);
   for (Eigen::Index j = 0; j < p; ++j) {
     const double variance = (inputs.values.col(j).array() - inputs.values.col(j).mean()).square().mean();
     constexpr double rounding = 1e-12;
@@ -134,8 +158,9 @@ Eigen::MatrixXd covariance_of_errors(const Rows& rows, const Inputs& inputs) {
     if (std::isnan(given)) continue;
     const double own = std::sqrt(covariance(j, j));
     const double factor = own > 0.0 ? given / own : 0.0;
-    covariance.row(j) *= factor;
-    covariance.col(j) *= factor;
+    // Filtered rows share their errors with their neighbours, so differences say nothing of them.
+    covariance.row(j) *= inputs.cutoff > 0.0 ? 0.0 : factor;
+    covariance.col(j) *= inputs.cutoff > 0.0 ? 0.0 : factor;
     covariance(j, j) = given * given;
   }
   return covariance;
@@ -152,6 +177,10 @@ InputNoise::InputNoise(const TermModel& model, const Inputs& inputs, const Eigen
   for (int pair = 0; pair < pairs_of_draws; ++pair) {
     Eigen::MatrixXd errors(inputs.values.rows(), inputs.values.cols());
     for (double& value : errors.reshaped()) value = random.normal();
+    if (inputs.cutoff > 0.0) {
+      const RowFilter filter(inputs);
+      errors = filter(errors) / filter.weights().norm();
+    }
     errors = errors * root;
     for (const double sign : {1.0, -1.0}) {
       auto draw = std::make_shared<Draw>();
@@ -170,6 +199,7 @@ InputNoise::InputNoise(const TermModel& model, const Inputs& inputs, const Eigen
         return base->simulated(values) + own->change;
       };
       draw->model = std::make_unique<TermModel>(draw->simulation, draw->inputs, model.outputs(), model.terms());
+      draw->model->share(model.shared(), draws_.size() + 1);
       draws_.push_back(std::move(draw));
     }
   }
@@ -254,7 +284,7 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
     if (is_hopeless || !inverse.isPositive() || inverse.info() != Eigen::Success) {
       Eigen::Index next = std::ssize(free);
       for (const PlacedTerm& placed : fit.placed) {
-        const Eigen::Index size = placed.coefficients.size() + (is_fitted(*model_, placed) ? 1 : 0);
+        const auto size = std::ssize(fitted_places(*model_, placed));
         const bool is_own =
             (errors.diagonal().segment(next, size).array() > most * gram.diagonal().segment(next, size).array()).any();
         if (is_own || !is_hopeless) beyond.push_back(model_->label(placed));
@@ -271,9 +301,10 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
     for (std::size_t k = 0; k < free.size(); ++k) moved.parameters(free[k]) += change(static_cast<Eigen::Index>(k));
     Eigen::Index next = std::ssize(free);
     for (PlacedTerm& placed : moved.placed) {
-      placed.coefficients += change.segment(next, placed.coefficients.size());
-      next += placed.coefficients.size();
-      if (is_fitted(*model_, placed)) placed.constants(0) += change(next++);
+      for (const Eigen::Index k : fitted_places(*model_, placed)) {
+        (k < placed.coefficients.size() ? placed.coefficients(k) : placed.constants(0)) += change(next++);
+      }
+      placed.constants = within_range(model_->terms()[placed.term], placed.constants);
     }
   }
   if (!factors.allFinite()) return beyond;
@@ -281,9 +312,7 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
     moved.parameter_errors(free[k]) *= factors(static_cast<Eigen::Index>(k));
   Eigen::Index next = std::ssize(free);
   for (std::size_t t = 0; t < moved.placed.size(); ++t) {
-    const Eigen::Index size = moved.placed[t].coefficients.size() + (is_fitted(*model_, moved.placed[t]) ? 1 : 0);
-    moved.errors[t].head(size).array() *= factors.segment(next, size).array();
-    next += size;
+    for (const Eigen::Index k : fitted_places(*model_, moved.placed[t])) moved.errors[t](k) *= factors(next++);
   }
   fit = std::move(moved);
   return beyond;

@@ -9,9 +9,9 @@
 
 namespace llmt::discovery {
 
-/// Covariance of the errors of inputs that are smooth in time: fourth differences D^4 of independent errors have 70
-/// times their covariance. Rows where a signal jumps (a difference beyond 5 robust standard deviations of any column)
-/// do not count. Zero for columns that are constant or not smooth.
+/// Covariance of the errors of inputs that are smooth in time, from divided differences of order 8 (of 6 or 4 where
+/// fewer than 50 rows have such), which leave next to nothing of the motion. Rows where a signal jumps (a difference
+/// beyond 5 robust standard deviations of any column) do not count. Zero for columns that are constant or not smooth.
 Eigen::MatrixXd noise_in_time(const Rows& rows, const Inputs& inputs);
 
 /// The simulation was computed at x + e, e the errors of the inputs, so residuals hold s(x) - s(x + e), and the

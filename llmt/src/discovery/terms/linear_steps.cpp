@@ -7,6 +7,7 @@
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/random_simulation.hpp"
 #include "discovery/terms/refuse.hpp"
+#include "discovery/terms/row_filter.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/statistics.hpp"
 
@@ -73,7 +74,7 @@ Eigen::VectorXd values_of(const std::vector<Parameter>& parameters) {
 
 // What the terms add, n x d.
 Eigen::MatrixXd added(const Simulation& linear, const Missing& missing, const Inputs& inputs) {
-  return missing.corrected - linear.predict(inputs.values, values_of(missing.parameters));
+  return missing.corrected - as_measured(inputs, linear.predict(inputs.values, values_of(missing.parameters)));
 }
 
 // Sum of squares at the rows searched that are no outliers, outputs by their spread.
@@ -196,14 +197,15 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
     const Simulation linear = linearisation.at(values, outputs);
     missing = find_missing(linear, inputs, measured, terms, options);
     terms_added = added(linear, missing, inputs);
-    const double before = left(missing, measured, outputs + terms_added);
+    const double before = left(missing, measured, as_measured(inputs, outputs) + terms_added);
     Eigen::VectorXd next = values_of(missing.parameters);
     Eigen::MatrixXd at_next = linearisation.outputs(next);
     settled = has_settled(missing, values) || is_linear(linear.predict(inputs.values, next), at_next, measured);
     constexpr int most_halvings = 6;
     constexpr double rounding = 1e-9;
     for (int k = 0;
-         k < most_halvings && left(missing, measured, at_next + terms_added) > (1.0 + rounding) * before && !settled;
+         k < most_halvings &&
+         left(missing, measured, as_measured(inputs, at_next) + terms_added) > (1.0 + rounding) * before && !settled;
          ++k) {
       next = 0.5 * (next + values);
       at_next = linearisation.outputs(next);
@@ -218,13 +220,13 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
     missing.parameters[k].value = values(static_cast<Eigen::Index>(k));
   }
-  missing.corrected = outputs + terms_added;
+  missing.corrected = as_measured(inputs, outputs) + terms_added;
   Eigen::VectorXd alone = start;
   for (const FittedParameter& fitted : missing.fitted_parameters) {
     const auto first = std::ranges::find(missing.parameters, fitted.parts.front(), &Parameter::name);
     alone(first - missing.parameters.begin()) += fitted.alone;
   }
-  missing.before = missing.found.empty() ? missing.corrected : linearisation.outputs(alone);
+  missing.before = missing.found.empty() ? missing.corrected : as_measured(inputs, linearisation.outputs(alone));
   const Samples aside = set_aside(missing);
   for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
     Gap& gap = missing.gaps[static_cast<std::size_t>(o)];
@@ -233,7 +235,10 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
       if (missing.change_by_smoothing.size() > 0) left -= missing.change_by_smoothing.col(o);
       return means(left, aside);
     };
-    gap = gap_of(gap.output, errors(nominal), errors(missing.before), errors(missing.corrected), gap.noise_floor);
+    const double known_noise = gap.known_noise;
+    gap = gap_of(gap.output, errors(as_measured(inputs, nominal)), errors(missing.before), errors(missing.corrected),
+                 gap.noise_floor);
+    gap.known_noise = known_noise;
   }
   return missing;
 }

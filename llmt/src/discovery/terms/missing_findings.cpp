@@ -10,6 +10,7 @@
 #include "discovery/terms/approximations.hpp"
 #include "discovery/terms/input_noise.hpp"
 #include "discovery/terms/structure.hpp"
+#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -33,20 +34,17 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
   found.generic = term.generic;
   found.code = term.code;
   found.inner_state = term.inner_state;
+  found.regime = term.regime;
   found.shown_by = term.shown_by;
-  found.coefficients = placed.coefficients;
-  found.constants = placed.constants;
-  for (Eigen::Index k = 0; k < std::ssize(term.coefficients); ++k) {
-    found.values.push_back({term.coefficients[k],
-                            term.unit.empty() ? unit_of(found.output, term.per)
-                            : k == 0          ? term.unit
-                                              : "",
-                            placed.coefficients(k), errors(k)});
+  found.whole = term.whole;
+  for (std::size_t k = 0; k < term.coefficients.size() && !term.whole; ++k) {
+    const std::string unit = term.unit.empty() ? unit_of(found.output, term.per) : k == 0 ? term.unit : "";
+    found.values.push_back({.name = term.coefficients[k], .unit = unit});
   }
-  for (Eigen::Index c = 0; c < std::ssize(term.constants); ++c) {
-    found.values.push_back(
-        {term.constants[c].name, term.constants[c].unit, placed.constants(c), errors(placed.coefficients.size() + c)});
+  for (const TermConstant& constant : term.constants) {
+    found.values.push_back({.name = constant.name, .unit = constant.unit});
   }
+  set_estimates(placed, errors, found);
   return found;
 }
 
@@ -65,6 +63,18 @@ Eigen::Index uncertain_coefficient(const FoundTerm& found) {
 }
 
 }  // namespace
+
+void set_estimates(const PlacedTerm& placed, const Eigen::VectorXd& errors, FoundTerm& found) {
+  found.coefficients = placed.coefficients;
+  found.constants = placed.constants;
+  Eigen::VectorXd all(placed.coefficients.size() + placed.constants.size());
+  all << placed.coefficients, placed.constants;
+  const Eigen::Index first = found.whole ? placed.coefficients.size() : 0;
+  for (std::size_t k = 0; k < found.values.size(); ++k) {
+    found.values[k].value = all(first + static_cast<Eigen::Index>(k));
+    found.values[k].standard_error = errors(first + static_cast<Eigen::Index>(k));
+  }
+}
 
 std::string option_label(const TermModel& model, const PlacedTerm& option) {
   std::string text = model.label(option);
@@ -139,8 +149,8 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
   }
   std::vector<Structure> all;
   for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
-    const Eigen::VectorXd left = data.measured.col(o) - means(missing.corrected.col(o), data.samples);
-    const Eigen::VectorXd gap = data.measured.col(o) - means(missing.before.col(o), data.samples);
+    const Eigen::VectorXd left = data.measured.col(o) - means_of_filtered(missing.corrected.col(o), data.samples);
+    const Eigen::VectorXd gap = data.measured.col(o) - means_of_filtered(missing.before.col(o), data.samples);
     const StructureLeft found = structure_left(samples, left, data.stretches, data.independent_share);
     const double common = found.share * left.squaredNorm();
     const double explained = std::max(0.0, gap.squaredNorm() - left.squaredNorm());
@@ -162,7 +172,7 @@ void decide(Missing& missing, bool in_time, const std::vector<bool>& cancelling)
   constexpr double certain = 2.0;  // standard errors
   const auto is_state = [](const FoundTerm& found) {
     return !found.inner_state.empty() &&
-           std::abs(found.coefficients(0)) > certain * found.values.front().standard_error;
+           std::abs(found.values.front().value) > certain * found.values.front().standard_error;
   };
   const bool has_inner_state = std::ranges::any_of(missing.found, is_state);
   double share_of_state = 0.0;
@@ -207,6 +217,24 @@ void demand_certainty(Missing& missing) {
   if (is_named && !std::ranges::all_of(missing.found, &FoundTerm::confirmed)) missing.answer = Answer::unknown;
 }
 
+void bound_by_noise(Missing& missing) {
+  constexpr double far = 5.0;
+  const bool is_clear = missing.answer == Answer::nothing_missing || missing.answer == Answer::parameters_only;
+  for (const Gap& gap : missing.gaps) {
+    if (!(gap.after > far * gap.known_noise)) continue;
+    if (is_clear) {
+      missing.answer = Answer::undecided;
+      missing.visible.clear();  // what is left would hide them
+    }
+    for (FoundTerm& found : missing.found) {
+      if (found.output == gap.output && found.inner_state.empty()) found.confirmed = false;
+    }
+    missing.notes.push_back(fmt::format(
+        "what is left of {} is {:.3g} times its known noise ({:.2g}): {}", gap.output, gap.after / gap.known_noise,
+        gap.known_noise, missing.found.empty() ? "no term tried explains it" : "something more is missing"));
+  }
+}
+
 std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms) {
   constexpr double certain = 2.0;  // standard errors
   std::set<std::size_t> beyond;
@@ -215,7 +243,8 @@ std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector
     for (Eigen::Index k = 0; k < found.constants.size() && !term.inner_state.empty(); ++k) {
       const std::vector<double>& tried = term.constants[static_cast<std::size_t>(k)].tried;
       const bool is_below = k == 0 && found.constants(k) <= tried.front();
-      const double error = found.values[static_cast<std::size_t>(found.coefficients.size() + k)].standard_error;
+      const Eigen::Index coefficients = found.whole ? 0 : found.coefficients.size();
+      const double error = found.values[static_cast<std::size_t>(coefficients + k)].standard_error;
       const double margin = k > 0 ? certain * error : 0.0;
       if (is_below || !(found.constants(k) + margin < tried.back())) beyond.insert(found.term);  // NaN at the limit
     }

@@ -21,6 +21,9 @@ struct Settled {
 /// "wave t (P = 2.3)".
 std::string option_label(const TermModel& model, const PlacedTerm& option);
 
+/// Coefficients and constants of a term that was found. `errors`: of its coefficients, then of its constants.
+void set_estimates(const PlacedTerm& placed, const Eigen::VectorXd& errors, FoundTerm& found);
+
 /// Missing::found, not yet confirmed.
 void describe_findings(const TermModel& model, const Settled& settled, Missing& missing);
 
@@ -42,6 +45,10 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 ///   error on the samples set aside.
 /// `cancelling`: of each term found, whether it nearly cancels others; empty: none.
 void decide(Missing& missing, bool in_time, const std::vector<bool>& cancelling = {});
+
+/// An answer has a bound from outside: where more is left of an output than some times its known noise, "nothing is
+/// missing" and "parameters only" become "undecided", and the terms of the output are not confirmed.
+void bound_by_noise(Missing& missing);
 
 /// What is named is certain: with a term that is not confirmed the answer is "unknown".
 void demand_certainty(Missing& missing);

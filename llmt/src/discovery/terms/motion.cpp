@@ -192,7 +192,10 @@ SmoothedInputs smoothed(const Inputs& inputs, const Eigen::MatrixXd& simulated) 
                         .notes = {}};
   constexpr Eigen::Index fewest = 60;
   // What has the wrong shape is refused by the search.
-  if (inputs.instants.size() == 0 || n < fewest || simulated.rows() != n || !simulated.allFinite()) return result;
+  // Speeds of one filter are as good as they get.
+  if (inputs.instants.size() == 0 || inputs.cutoff > 0.0 || n < fewest || simulated.rows() != n ||
+      !simulated.allFinite())
+    return result;
   const Surrogate surrogate(inputs.values, simulated);
   constexpr double described = 0.98;
   if (surrogate.described().minCoeff() < described) return result;

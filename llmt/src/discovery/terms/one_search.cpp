@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "discovery/terms/approximations.hpp"
 #include "discovery/terms/correlation.hpp"
@@ -11,6 +12,7 @@
 #include "discovery/terms/held_out.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/refuse.hpp"
+#include "discovery/terms/row_filter.hpp"
 #include "discovery/terms/row_split.hpp"
 #include "discovery/terms/standstill.hpp"
 #include "discovery/terms/term_question.hpp"
@@ -33,7 +35,7 @@ DistinctParameters determined(const TermModel& model, const TermData& data, cons
 
 TermData data_of(const Samples& samples, const MeasuredOutputs& measured) {
   return {.samples = samples,
-          .measured = means(measured.values, samples),
+          .measured = means_of_filtered(measured.values, samples),
           .sigma = Eigen::VectorXd::Ones(measured.values.cols()),
           .stretches = {}};
 }
@@ -53,6 +55,18 @@ double correlation_time(const RowSplit& split, const Eigen::MatrixXd& deviations
   return split.step * longest;
 }
 
+// Of the samples: the noise of an output, and what errors of the inputs do to the simulation.
+void set_known_noise(const MeasuredOutputs& measured, const ErrorsOfInputs& errors, Eigen::Index rows_per_sample,
+                     Missing& missing) {
+  if (measured.noise.size() == 0) return;
+  Eigen::VectorXd variances = measured.noise.cwiseAbs2();
+  if (errors.noise) variances += errors.noise->scatter().cwiseAbs2().colwise().mean().transpose();
+  for (std::size_t o = 0; o < missing.gaps.size(); ++o) {
+    missing.gaps[o].known_noise =
+        std::sqrt(variances(static_cast<Eigen::Index>(o)) / static_cast<double>(rows_per_sample));
+  }
+}
+
 }  // namespace
 
 Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
@@ -60,7 +74,8 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
                     const std::set<std::size_t>& refuted) {
   const bool in_time = inputs.instants.size() > 0;
   Simulation distinct = simulation;
-  const TermModel model(distinct, inputs, measured.names, terms, refuted);
+  TermModel model(distinct, inputs, measured.names, terms, refuted);
+  model.share(searched.columns, 0);
   Eigen::VectorXd start(std::ssize(simulation.parameters));
   for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
   RowSplit split =
@@ -107,9 +122,9 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   }
   const TermData kept = without_samples(data, settled.verdict.outliers);
   if (!settled.verdict.outliers.empty()) baseline = fit_terms(model, kept, start, {});
-  const Eigen::MatrixXd nominal = model.predict(start, {});
-  missing.before = model.predict(baseline.parameters, {});
-  missing.corrected = model.predict(settled.fit.parameters, settled.fit.placed);
+  const Eigen::MatrixXd nominal = as_measured(inputs, model.predict(start, {}));
+  missing.before = as_measured(inputs, model.predict(baseline.parameters, {}));
+  missing.corrected = as_measured(inputs, model.predict(settled.fit.parameters, settled.fit.placed));
   missing.structure = structure_beside(model, kept, inputs, errors.deviations, missing);
   // Independent rows with errors of the inputs deviate like their neighbours: the errors alone do that.
   if (errors.noise && !in_time) missing.structure.clear();
@@ -128,9 +143,13 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   for (Eigen::Index o = 0; o < d; ++o) {
     const Eigen::VectorXd before = measured.values.col(o) - missing.before.col(o);
     const Eigen::VectorXd after = measured.values.col(o) - missing.corrected.col(o);
-    missing.gaps.push_back(gap_of(measured.names[o], means(measured.values.col(o) - nominal.col(o), split.held_out),
-                                  means(before, split.held_out), means(after, split.held_out), noise * data.sigma(o)));
+    const auto aside_of = [&](const Eigen::VectorXd& rows) { return means_of_filtered(rows, split.held_out); };
+    missing.gaps.push_back(gap_of(measured.names[o], aside_of(measured.values.col(o) - nominal.col(o)),
+                                  aside_of(before), aside_of(after), noise * data.sigma(o)));
   }
+  set_known_noise(measured, errors, split.rows_per_sample, missing);
+  bound_by_noise(missing);
+  demand_certainty(missing);
   if (in_time) {
     missing.time = {.in_time = true,
                     .found_out = false,

@@ -1,9 +1,11 @@
 // One search with rows set aside.
 #pragma once
 
+#include <memory>
 #include <set>
 #include <vector>
 
+#include "discovery/terms/column_cache.hpp"
 #include "llmt/discovery/missing.hpp"
 #include "llmt/discovery/model_term.hpp"
 
@@ -11,8 +13,9 @@ namespace llmt::discovery {
 
 /// The rows of a search.
 struct SearchedRows {
-  std::vector<bool> apart;             ///< not searched, not set aside either
-  Eigen::Index fewest_samples = 1000;  ///< that averaging rows in time may leave
+  std::vector<bool> apart;                    ///< not searched, not set aside either
+  Eigen::Index fewest_samples = 1000;         ///< that averaging rows in time may leave
+  std::shared_ptr<ColumnCache> columns = {};  ///< of filtered rows
 };
 
 /// Searches all terms but those refuted at all rows but those apart, and judges what it finds on the rows set aside.

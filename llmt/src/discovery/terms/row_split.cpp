@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "discovery/terms/refuse.hpp"
+#include "discovery/terms/row_filter.hpp"
 #include "llmt/random.hpp"
 
 namespace llmt::discovery {
@@ -274,7 +275,46 @@ Samples blocks_in_time(const Inputs& inputs, Eigen::Index length) {
   return blocks;
 }
 
+namespace {
+
+// Samples as far apart as their noise is independent, each with what is computed around it.
+RowSplit split_filtered(const Inputs& inputs, const MissingOptions& options) {
+  const RowFilter filter(inputs);
+  Recording recording = recording_of(inputs);
+  std::vector<std::pair<std::size_t, Eigen::Index>> places(inputs.values.rows());  // piece, place in it
+  recording.runs.clear();
+  for (std::size_t p = 0; p < filter.pieces().size(); ++p) {
+    const Piece& piece = filter.pieces()[p];
+    recording.runs.push_back(inputs.runs.empty() ? Eigen::Index{0} : inputs.runs[piece.front()]);
+    for (Eigen::Index k = 0; k < std::ssize(piece); ++k) places[piece[k]] = {p, k};
+  }
+  recording.pieces = filter.pieces();
+  RowSplit split;
+  split.step = filter.step() * static_cast<double>(filter.stride());
+  const Eigen::Index half = filter.weights().size() / 2;
+  Eigen::Index stretch = -1;
+  const Segment* before = nullptr;
+  const std::vector<Segment> segments = segments_of(recording, filter.stride(), options);
+  for (const Segment& segment : segments) {
+    const bool goes_on = before != nullptr && before->piece == segment.piece && !before->is_held_out;
+    if (!segment.is_held_out && !goes_on) ++stretch;
+    for (const Eigen::Index row : segment.rows) {
+      const auto [p, k] = places[row];
+      const Piece& piece = filter.pieces()[p];
+      if (k % filter.stride() != 0 || k < half || k + half >= std::ssize(piece)) continue;
+      const auto around = std::span(piece).subspan(k - half, filter.weights().size());
+      (segment.is_held_out ? split.held_out : split.searched).add(row, around, filter.weights());
+      if (!segment.is_held_out) split.stretches.push_back(stretch);
+    }
+    before = &segment;
+  }
+  return split;
+}
+
+}  // namespace
+
 RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options, Eigen::Index fewest_samples) {
+  if (inputs.cutoff > 0.0) return split_filtered(inputs, options);
   const Recording recording = recording_of(inputs);
   RowSplit split;
   split.step = recording.step;

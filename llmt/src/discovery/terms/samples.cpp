@@ -3,6 +3,26 @@
 namespace llmt::discovery {
 
 Eigen::MatrixXd means(const Eigen::MatrixXd& of_rows, const Samples& samples) {
+  if (!samples.is_filtered()) return means_of_filtered(of_rows, samples);
+  Eigen::MatrixXd result(samples.size(), of_rows.cols());
+  const Eigen::VectorXd& weights = samples.weights();
+  for (Eigen::Index c = 0; c < of_rows.cols(); ++c) {
+    for (Eigen::Index i = 0; i < samples.size(); ++i) {
+      const std::span<const Eigen::Index> around = samples.around(i);
+      // Rows stand in the order of time in nearly all tables.
+      if (around.back() - around.front() + 1 == weights.size()) {
+        result(i, c) = weights.dot(of_rows.col(c).segment(around.front(), weights.size()));
+        continue;
+      }
+      double sum = 0.0;
+      for (Eigen::Index k = 0; k < weights.size(); ++k) sum += weights(k) * of_rows(around[k], c);
+      result(i, c) = sum;
+    }
+  }
+  return result;
+}
+
+Eigen::MatrixXd means_of_filtered(const Eigen::MatrixXd& of_rows, const Samples& samples) {
   Eigen::MatrixXd result(samples.size(), of_rows.cols());
   for (Eigen::Index c = 0; c < of_rows.cols(); ++c) {
     for (Eigen::Index i = 0; i < samples.size(); ++i) {
@@ -15,10 +35,9 @@ Eigen::MatrixXd means(const Eigen::MatrixXd& of_rows, const Samples& samples) {
   return result;
 }
 
-double share_kept(const Eigen::VectorXd& of_rows, const Samples& samples) {
-  if (std::ssize(samples.rows()) == samples.size()) return 1.0;
+double share_kept(const Eigen::VectorXd& of_rows, const Eigen::VectorXd& kept, const Samples& samples) {
+  if (std::ssize(samples.rows()) == samples.size() && !samples.is_filtered()) return 1.0;
   const Eigen::VectorXd rows = of_rows(samples.rows());
-  const Eigen::VectorXd kept = means(of_rows, samples);
   const double all = (rows.array() - rows.mean()).square().mean();
   return all > 0.0 ? (kept.array() - kept.mean()).square().mean() / all : 1.0;
 }

@@ -8,7 +8,8 @@
 namespace llmt::discovery {
 
 /// Observations, each the mean over some rows: one row where rows are independent, a block of consecutive rows where
-/// they were taken in time.
+/// they were taken in time; or one row whose measured outputs went through a filter, and the weighted mean of what is
+/// computed at the rows around it.
 ///
 /// An equation y = s(x) + sum_j b_j T_j(x) + noise that is linear in the columns y, s and T_j holds for their means
 /// over any rows too. The terms are computed at the rows, so the mean rounds nothing off, as a filter on x would
@@ -20,7 +21,20 @@ class Samples {
     ends_.push_back(std::ssize(rows_));
   }
 
+  /// `around`: rows of the weights.
+  void add(Eigen::Index row, std::span<const Eigen::Index> around, const Eigen::VectorXd& weights) {
+    add(std::span(&row, 1));
+    around_.insert(around_.end(), around.begin(), around.end());
+    weights_ = weights;
+  }
+
   Eigen::Index size() const { return std::ssize(ends_); }
+  bool is_filtered() const { return weights_.size() > 0; }
+  const Eigen::VectorXd& weights() const { return weights_; }
+  /// Of a sample that is filtered.
+  std::span<const Eigen::Index> around(Eigen::Index sample) const {
+    return std::span(around_).subspan(sample * weights_.size(), weights_.size());
+  }
   /// Of all samples, one after the other.
   const std::vector<Eigen::Index>& rows() const { return rows_; }
   std::span<const Eigen::Index> rows_of(Eigen::Index sample) const {
@@ -28,19 +42,34 @@ class Samples {
     return std::span(rows_).subspan(begin, ends_[sample] - begin);
   }
 
+  /// Takes a sample of others over, whole.
+  void add(const Samples& others, Eigen::Index sample) {
+    if (others.is_filtered()) {
+      add(others.rows_of(sample).front(), others.around(sample), others.weights_);
+    } else {
+      add(others.rows_of(sample));
+    }
+  }
+
  private:
   std::vector<Eigen::Index> rows_;
   std::vector<Eigen::Index> ends_;
+  std::vector<Eigen::Index> around_;
+  Eigen::VectorXd weights_;
 };
 
-/// The share of the variance of a column that its means keep, 1 where samples are single rows. A column that varies
-/// much faster than the samples keeps little: what is left of it is chance.
-double share_kept(const Eigen::VectorXd& of_rows, const Samples& samples);
+/// The share of the variance of a column that its means, `kept`, keep, 1 where samples are single rows. A column that
+/// varies much faster than the samples keeps little: what is left of it is chance.
+double share_kept(const Eigen::VectorXd& of_rows, const Eigen::VectorXd& kept, const Samples& samples);
 
 /// The number of samples that carry a column, (sum u^2)^2 / sum u^4 of its deviations u from their mean.
 double carriers(const Eigen::VectorXd& of_samples);
 
-/// The mean of every sample; samples x columns. `of_rows`: a row for each row of the data.
+/// The mean of every sample of what is computed at the rows; samples x columns. `of_rows`: a row for each row of the
+/// data.
 Eigen::MatrixXd means(const Eigen::MatrixXd& of_rows, const Samples& samples);
+
+/// The mean of every sample of what has been through the filter, as measured outputs have.
+Eigen::MatrixXd means_of_filtered(const Eigen::MatrixXd& of_rows, const Samples& samples);
 
 }  // namespace llmt::discovery

@@ -11,6 +11,7 @@
 #include "discovery/terms/averaged_rows.hpp"
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/determined.hpp"
+#include "discovery/terms/final_fit.hpp"
 #include "discovery/terms/limits.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/motion.hpp"
@@ -19,6 +20,7 @@
 #include "discovery/terms/random_simulation.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/reversals.hpp"
+#include "discovery/terms/row_filter.hpp"
 #include "discovery/terms/row_split.hpp"
 #include "discovery/terms/standstill.hpp"
 #include "discovery/terms/term_model.hpp"
@@ -100,7 +102,7 @@ Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const Measur
   const Eigen::MatrixXd simulated = simulation.predict(inputs.values, nominal_values(simulation));
   // What has the wrong shape is refused by the search.
   if (simulated.rows() != measured.values.rows() || simulated.cols() != measured.values.cols()) return inputs;
-  inputs.zero_bands = zero_bands(inputs, measured.values - simulated);
+  inputs.zero_bands = zero_bands(inputs, measured.values - as_measured(inputs, simulated));
   if (!(inputs.zero_bands.array() > 0.0).any()) inputs.zero_bands.resize(0);
   return inputs;
 }
@@ -122,7 +124,7 @@ std::vector<std::string> notes_on_rest(const Inputs& inputs) {
 // term must shrink the gap on the rows set aside, of one search or the next.
 Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, const MeasuredOutputs& measured,
                 const std::vector<ModelTerm>& terms, const SearchedRows& rows, MissingOptions options,
-                std::set<std::size_t> refuted, Missing missing) {
+                std::set<std::size_t> refuted, Missing missing, bool with_alternatives) {
   const Inputs& inputs = smooth.inputs;
   const bool in_time = inputs.instants.size() > 0;
   const int most = in_time ? 4 : 3;
@@ -139,6 +141,7 @@ Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, cons
                  narrow.contains(found.term);
         });
     if (holds || (trial >= most && beyond.empty() && narrow.empty())) {
+      if (!with_alternatives) return missing;
       const Alternatives alternatives{simulation, inputs, measured, terms, rows, options, refuted};
       missing = alternatives.state_for_terms(std::move(missing));
       missing = alternatives.terms_for_state(std::move(missing));
@@ -196,13 +199,16 @@ Beginning begin(const Simulation& simulation, const Inputs& inputs, const Measur
   };
   const auto is_beyond = [&] { return !beyond_constants(now.missing, terms).empty(); };
   search();
-  if (inputs.instants.size() == 0 || is_beyond()) return now;
+  // Filtered alike, the simulation is right at reversals, and samples are as far apart as they are independent.
+  if (inputs.instants.size() == 0 || inputs.cutoff > 0.0 || is_beyond()) return now;
   // What is left is alike in neighbours: single rows say little more than their means, which hold less noise. A state
   // is of single rows, and rings after reversals.
   constexpr double alike = 0.5;  // independent share
   constexpr Eigen::Index fewest_of_alike = 80;
+  constexpr Eigen::Index samples_for_a_parameter = 10;
+  const auto free = std::ranges::count_if(simulation.parameters, &Parameter::free);
   if (!resonance_comes_first(now.missing, terms) && now.missing.time.independent_share < alike) {
-    now.rows.fewest_samples = fewest_of_alike;
+    now.rows.fewest_samples = fewest_of_alike + samples_for_a_parameter * free;
     search();
   }
   constexpr int most = 3;
@@ -230,10 +236,12 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   }
   smooth.inputs = with_zero_bands(there, std::move(smooth.inputs), measured);
   const Inputs& inputs = smooth.inputs;
-  SearchedRows rows{rows_at_rest(inputs)};
+  SearchedRows rows{.apart = rows_at_rest(inputs)};
+  if (inputs.cutoff > 0.0) rows.columns = std::make_shared<ColumnCache>(inputs);
   for (std::size_t i = 0; i < rows.apart.size(); ++i) rows.apart[i] = rows.apart[i] || smooth.unknown_sign[i];
-  const std::vector<std::string> at_limits = notes_on_limits(rows_at_limits(measured, simulated, rows.apart));
-  const auto search_without = [&](std::set<std::size_t> refuted) {
+  const std::vector<std::string> at_limits =
+      notes_on_limits(rows_at_limits(measured, as_measured(as_given, simulated), rows.apart));
+  const auto search_without = [&](std::set<std::size_t> refuted, bool with_alternatives = true) {
     Beginning beginning = begin(there, inputs, measured, terms, rows, options, refuted);
     // The filter of a recording looks like a state whose constants are not those of a machine.
     for (auto beyond = beyond_constants(beginning.missing, terms); !beyond.empty();
@@ -241,21 +249,32 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
       refuted.insert(beyond.begin(), beyond.end());
       beginning = begin(there, inputs, measured, terms, rows, options, refuted);
     }
-    Missing found =
-        find_at(there, smooth, measured, terms, beginning.rows, options, refuted, std::move(beginning.missing));
+    Missing found = find_at(there, smooth, measured, terms, beginning.rows, options, refuted,
+                            std::move(beginning.missing), with_alternatives);
     found.notes.insert(found.notes.begin(), beginning.at_reversals.begin(), beginning.at_reversals.end());
-    return found;
+    return std::pair(std::move(found), std::move(beginning.rows));
   };
-  Missing missing = search_without({});
+  const std::set<std::size_t> regimes = terms_of_regimes(terms);
+  auto [missing, searched] = search_without(regimes);
   const bool is_judged = inputs.instants.size() > 0 && !missing.held_out.empty();
   if (is_judged && has_gain(missing) && missing.answer != Answer::inner_state) {
-    missing = inputs_for_gain(std::move(missing), search_without(shares_of_the_simulation(terms)), measured,
-                              options.search.rival_margin);
+    std::set<std::size_t> left_out = shares_of_the_simulation(terms);
+    left_out.insert(regimes.begin(), regimes.end());
+    auto [of_inputs, searched_for_inputs] = search_without(left_out);
+    missing = inputs_for_gain(std::move(missing), std::move(of_inputs), measured, options.search.rival_margin);
+    if (!has_gain(missing)) searched = std::move(searched_for_inputs);
   }
+  if (!regimes.empty() && !missing.held_out.empty() && leaves_something(missing)) {
+    auto [of_regimes, searched_for_regimes] = search_without({}, false);
+    missing = regimes_for_unknown(std::move(missing), std::move(of_regimes));
+    const bool has_regime = std::ranges::any_of(missing.found, [](const FoundTerm& f) { return !f.regime.empty(); });
+    if (has_regime) searched = std::move(searched_for_regimes);
+  }
+  fit_on_all_rows(there, inputs, measured, terms, searched, options, missing);
   missing.zero_bands = inputs.zero_bands;
   if (is_smoothed) {
     missing.before -= smooth.change;
-    missing.corrected = corrected(simulation, missing, terms, as_given);
+    missing.corrected = as_measured(as_given, corrected(simulation, missing, terms, as_given));
     missing.change_by_smoothing = smooth.change;
   }
   const std::vector<std::string> at_rest = notes_on_rest(inputs);

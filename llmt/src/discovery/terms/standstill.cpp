@@ -26,6 +26,17 @@ Eigen::VectorXd roughness(const Rows& rows, const Eigen::VectorXd& values) {
 
 void keep(const Samples& from, const std::vector<bool>& apart, Samples& to, std::vector<bool>& kept) {
   for (Eigen::Index i = 0; i < from.size(); ++i) {
+    if (from.is_filtered()) {
+      // Next to nothing of what is set apart may be in what is computed.
+      constexpr double negligible = 0.02;
+      double share = 0.0;
+      for (Eigen::Index k = 0; k < from.weights().size(); ++k) {
+        if (apart[from.around(i)[k]]) share += std::abs(from.weights()(k));
+      }
+      kept.push_back(!apart[from.rows_of(i).front()] && share <= negligible);
+      if (kept.back()) to.add(from, i);
+      continue;
+    }
     const std::span<const Eigen::Index> all = from.rows_of(i);
     std::vector<Eigen::Index> left;
     std::ranges::copy_if(all, std::back_inserter(left), [&](Eigen::Index row) { return !apart[row]; });

@@ -8,6 +8,8 @@
 namespace llmt::discovery {
 namespace {
 
+constexpr Eigen::Index most_with_squares = 8;
+
 Eigen::MatrixXd ridge_fit(const Eigen::MatrixXd& features, const Eigen::MatrixXd& outputs) {
   // Enough to make the solution unique; the features are of order one.
   constexpr double ridge = 1e-10;
@@ -53,7 +55,6 @@ Surrogate::Surrogate(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simul
 Eigen::MatrixXd Surrogate::features(const Eigen::MatrixXd& inputs) const {
   const Eigen::Index n = inputs.rows();
   const Eigen::Index p = inputs.cols();
-  constexpr Eigen::Index most_with_squares = 8;
   std::vector<Eigen::ArrayXd> columns = {Eigen::ArrayXd::Ones(n)};
   const Eigen::MatrixXd z = (inputs.rowwise() - centre_).array().rowwise() / spread_.array();
   for (Eigen::Index j = 0; j < p; ++j) {
@@ -61,7 +62,7 @@ Eigen::MatrixXd Surrogate::features(const Eigen::MatrixXd& inputs) const {
     columns.insert(columns.end(), {x, x.square(), x.cube()});
     const Eigen::ArrayXd own = inputs.col(j).array();
     columns.insert(columns.end(), {own.sin(), own.cos()});
-    if (low_(j) < 0.0 && high_(j) > 0.0) {
+    if (changes_sign(j)) {
       const Eigen::ArrayXd scaled = own / spread_(j);
       columns.insert(columns.end(), {own.sign(), scaled.abs(), scaled * scaled.abs()});
     }
@@ -77,6 +78,20 @@ Eigen::MatrixXd Surrogate::features(const Eigen::MatrixXd& inputs) const {
 }
 
 Eigen::MatrixXd Surrogate::predict(const Eigen::MatrixXd& inputs) const { return features(inputs) * coefficients_; }
+
+Eigen::MatrixXd Surrogate::jumps(const Eigen::MatrixXd& inputs) const {
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(inputs.rows(), coefficients_.cols());
+  Eigen::Index place = 1;
+  for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
+    place += 5;
+    if (changes_sign(j)) {
+      sum += inputs.col(j).cwiseSign() * coefficients_.row(place);
+      place += 3;
+    }
+    if (with_products_) place += j * (inputs.cols() <= most_with_squares ? 3 : 1);
+  }
+  return sum;
+}
 
 Eigen::MatrixXd Surrogate::derivative(const Eigen::MatrixXd& inputs, Eigen::Index column) const {
   constexpr double share = 1e-4;  // of the spread

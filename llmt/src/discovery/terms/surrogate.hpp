@@ -17,6 +17,8 @@ class Surrogate {
   Eigen::MatrixXd predict(const Eigen::MatrixXd& inputs) const;
   /// Derivative by input number `column`, by central differences; n x d.
   Eigen::MatrixXd derivative(const Eigen::MatrixXd& inputs, Eigen::Index column) const;
+  /// The part that jumps: coefficients times sgn x of the inputs that change sign; n x d.
+  Eigen::MatrixXd jumps(const Eigen::MatrixXd& inputs) const;
   /// d: share of the variance of each output that is described on rows left out of the fit (five parts in turn).
   const Eigen::VectorXd& described() const { return described_; }
 
@@ -29,6 +31,7 @@ class Surrogate {
   Eigen::MatrixXd coefficients_;
   Eigen::VectorXd described_;
 
+  bool changes_sign(Eigen::Index input) const { return low_(input) < 0.0 && high_(input) > 0.0; }
   Eigen::MatrixXd features(const Eigen::MatrixXd& inputs) const;
 };
 

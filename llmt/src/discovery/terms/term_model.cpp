@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
+#include "discovery/search/workspace.hpp"
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "llmt/discovery/least_squares.hpp"
@@ -45,6 +47,7 @@ Layout layout_of(const TermModel& model, const TermData& data, const Eigen::Vect
       parameter.name = fmt::format("term{}.coefficient{}", t, k);
       parameter.value = placed[t].coefficients(k);
       parameter.scale = rms > 0.0 ? sigma / rms : 1.0;
+      parameter.free = !placed[t].is_held(k);
       layout.parameters.push_back(std::move(parameter));
     }
     for (std::size_t c = 0; c < term.constants.size(); ++c) {
@@ -59,13 +62,14 @@ Layout layout_of(const TermModel& model, const TermData& data, const Eigen::Vect
   return layout;
 }
 
-std::vector<PlacedTerm> unpack(const std::vector<PlacedTerm>& placed, const Eigen::VectorXd& values, std::size_t own) {
+std::vector<PlacedTerm> unpack(const TermModel& model, const std::vector<PlacedTerm>& placed,
+                               const Eigen::VectorXd& values, std::size_t own) {
   std::vector<PlacedTerm> result = placed;
   Eigen::Index next = own;
   for (PlacedTerm& term : result) {
     term.coefficients = values.segment(next, term.coefficients.size());
     next += term.coefficients.size();
-    term.constants = values.segment(next, term.constants.size());
+    term.constants = within_range(model.terms()[term.term], values.segment(next, term.constants.size()));
     next += term.constants.size();
   }
   return result;
@@ -158,12 +162,43 @@ const Eigen::MatrixXd& TermModel::simulated(const Eigen::VectorXd& values) const
 Eigen::MatrixXd TermModel::columns(const PlacedTerm& placed, const Eigen::MatrixXd& simulated) const {
   const ModelTerm& term = (*terms_)[placed.term];
   rows_.simulated = simulated.col(placed.output);
-  Eigen::MatrixXd columns = term.columns(rows_, placed.constants);
+  Eigen::MatrixXd columns = term.columns(rows_, within_range(term, placed.constants));
   if (columns.rows() != simulated.rows() || columns.cols() != std::ssize(term.coefficients)) {
     refuse("find_missing", fmt::format("the term {} gave {} x {} values, must be {} x {}", label(placed),
                                        columns.rows(), columns.cols(), simulated.rows(), term.coefficients.size()));
   }
   return columns;
+}
+
+Eigen::MatrixXd TermModel::means_of(const PlacedTerm& placed, const Eigen::MatrixXd& simulated,
+                                    const Samples& samples) const {
+  const auto finite = [&] {
+    Eigen::MatrixXd values = columns(placed, simulated);
+    const Eigen::Index bad = first_bad_row(values);
+    if (bad < values.rows()) {
+      refuse("find_missing", fmt::format("the term {} is not finite at row {}", label(placed), bad + 1));
+    }
+    return values;
+  };
+  if (shared_ == nullptr || !samples.is_filtered() || !ColumnCache::holds((*terms_)[placed.term])) {
+    return means(finite(), samples);
+  }
+  return shared_->at(samples, draw_, placed.term, finite);
+}
+
+Eigen::MatrixXd TermModel::columns_at(const PlacedTerm& placed, const Eigen::MatrixXd& simulated,
+                                      const std::vector<Eigen::Index>& rows) const {
+  if (few_of_ != rows) {
+    few_of_ = rows;
+    few_ = {.inputs = rows_.inputs(rows, Eigen::all),
+            .simulated = {},
+            .sequence = std::vector<Eigen::Index>(rows.size()),
+            .instants = rows_.instants(rows)};
+    std::iota(few_.sequence.begin(), few_.sequence.end(), Eigen::Index{0});
+  }
+  few_.simulated = simulated.col(placed.output)(rows);
+  const ModelTerm& term = (*terms_)[placed.term];
+  return term.columns(few_, within_range(term, placed.constants));
 }
 
 Eigen::MatrixXd TermModel::predict(const Eigen::VectorXd& values, const std::vector<PlacedTerm>& placed) const {
@@ -214,17 +249,41 @@ Eigen::MatrixXd baseline_jacobian(const TermModel& model, const TermData& data, 
 
 Eigen::MatrixXd stacked_signature(const TermModel& model, const TermData& data, const PlacedTerm& placed,
                                   const Eigen::MatrixXd& simulated) {
-  const Eigen::MatrixXd columns = model.columns(placed, simulated);
-  const Eigen::Index bad = first_bad_row(columns);
-  if (bad < columns.rows())
-    refuse("find_missing", fmt::format("the term {} is not finite at row {}", model.label(placed), bad + 1));
-  const Eigen::MatrixXd of_samples = means(columns, data.samples);
+  const Eigen::MatrixXd of_samples = model.means_of(placed, simulated, data.samples);
   const Eigen::Index d = data.measured.cols();
-  Eigen::MatrixXd signature = Eigen::MatrixXd::Zero(data.measured.size(), columns.cols());
+  Eigen::MatrixXd signature = Eigen::MatrixXd::Zero(data.measured.size(), of_samples.cols());
   for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
     signature.row(i * d + placed.output) = of_samples.row(i) / data.sigma(placed.output);
   }
   return signature;
+}
+
+void hold(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
+          std::vector<PlacedTerm>& placed) {
+  // As SearchOptions::absorbed_tolerance and in distinct_parameters().
+  constexpr double absorbed = 1e-3;
+  const Eigen::MatrixXd by_parameters = baseline_jacobian(model, data, parameters, {});
+  const Eigen::MatrixXd own_range = range_basis(by_parameters, absorbed);
+  const Eigen::MatrixXd simulated = model.simulated(parameters);
+  for (PlacedTerm& term : placed) {
+    const bool whole = model.terms()[term.term].whole;
+    term.held.assign(term.coefficients.size(), whole);
+    if (whole) term.coefficients.setOnes();
+    if (whole || own_range.cols() == 0) continue;
+    Eigen::MatrixXd range = own_range;
+    const Eigen::MatrixXd columns = stacked_signature(model, data, term, simulated);
+    for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+      Eigen::VectorXd outside = columns.col(k) - range * (range.transpose() * columns.col(k));
+      outside -= range * (range.transpose() * outside);
+      if (outside.norm() < absorbed * columns.col(k).norm()) {
+        term.held[k] = true;
+        term.coefficients(k) = 0.0;
+        continue;
+      }
+      range.conservativeResize(Eigen::NoChange, range.cols() + 1);
+      range.rightCols(1) = outside.normalized();
+    }
+  }
 }
 
 TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
@@ -238,14 +297,16 @@ TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::Vec
     LeastSquaresProblem problem;
     problem.parameters = layout.parameters;
     problem.residual = [&](const Eigen::VectorXd& values) {
-      return scaled_residuals(model, data, values.head(own), unpack(placed, values, layout.own));
+      return scaled_residuals(model, data, values.head(own), unpack(model, placed, values, layout.own));
     };
     SolverResult result = solve(problem);
     if (!data.stretches.empty()) {
       result.standard_errors.array() *= error_factors(data, problem, result).array();
     }
-    TermFit fit{
-        result.values.head(own), result.standard_errors.head(own), unpack(placed, result.values, layout.own), {}};
+    TermFit fit{result.values.head(own),
+                result.standard_errors.head(own),
+                unpack(model, placed, result.values, layout.own),
+                {}};
     if (constants_are_free && !within_tried(model, placed, fit.placed)) continue;
     Eigen::Index next = own;
     for (const PlacedTerm& term : placed) {
@@ -255,6 +316,9 @@ TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::Vec
       for (std::size_t c = 0; c < constants.size(); ++c) {
         const Eigen::Index place = term.coefficients.size() + c;
         if (!constants_are_free || !constants[c].smooth) errors(place) = std::numeric_limits<double>::quiet_NaN();
+      }
+      for (Eigen::Index c = 0; c < term.coefficients.size(); ++c) {
+        if (term.is_held(c)) errors(c) = std::numeric_limits<double>::quiet_NaN();
       }
       fit.errors.push_back(errors);
       next += k;

@@ -1,9 +1,11 @@
 // A simulation with terms added: prediction, refit, trial of constants.
 #pragma once
 
+#include <memory>
 #include <set>
 #include <vector>
 
+#include "discovery/terms/column_cache.hpp"
 #include "discovery/terms/samples.hpp"
 #include "llmt/discovery/missing.hpp"
 #include "llmt/discovery/model_term.hpp"
@@ -17,6 +19,10 @@ struct PlacedTerm {
   Eigen::VectorXd constants;
   Eigen::VectorXd coefficients;
   double prior_cost = 0.0;
+  double explained = 0.0;       ///< of the sum of squares, by best_constants()
+  std::vector<bool> held = {};  ///< coefficients that are not fitted, see hold(); empty: all are
+
+  bool is_held(Eigen::Index coefficient) const { return !held.empty() && held[coefficient]; }
 };
 
 /// Evaluates on all rows, those set aside included, because terms may depend on the inputs of the row before.
@@ -24,6 +30,13 @@ class TermModel {
  public:
   TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
             const std::vector<ModelTerm>& terms, std::set<std::size_t> refuted = {});
+
+  /// Columns that searches share; `draw`: of the errors of the inputs, 0: none.
+  void share(std::shared_ptr<ColumnCache> columns, std::size_t draw) {
+    shared_ = std::move(columns);
+    draw_ = draw;
+  }
+  const std::shared_ptr<ColumnCache>& shared() const { return shared_; }
 
   const std::vector<ModelTerm>& terms() const { return *terms_; }
   /// Terms that were refuted are no candidates.
@@ -35,6 +48,11 @@ class TermModel {
   const Eigen::MatrixXd& simulated(const Eigen::VectorXd& values) const;
   /// n x k of the term at the simulated outputs. Throws std::invalid_argument naming the term.
   Eigen::MatrixXd columns(const PlacedTerm& placed, const Eigen::MatrixXd& simulated) const;
+  /// Means over samples of the columns. Throws std::invalid_argument naming the term where it is not finite.
+  Eigen::MatrixXd means_of(const PlacedTerm& placed, const Eigen::MatrixXd& simulated, const Samples& samples) const;
+  /// As columns(), at some rows alone, of a term that does not depend on other rows.
+  Eigen::MatrixXd columns_at(const PlacedTerm& placed, const Eigen::MatrixXd& simulated,
+                             const std::vector<Eigen::Index>& rows) const;
   /// n x d.
   Eigen::MatrixXd predict(const Eigen::VectorXd& values, const std::vector<PlacedTerm>& placed) const;
 
@@ -50,7 +68,11 @@ class TermModel {
   std::vector<std::string> outputs_;
   const std::vector<ModelTerm>* terms_;
   std::set<std::size_t> refuted_;
+  std::shared_ptr<ColumnCache> shared_;
+  std::size_t draw_ = 0;
   mutable Rows rows_;
+  mutable std::vector<Eigen::Index> few_of_;  // rows of `few_`
+  mutable Rows few_;
   mutable Eigen::VectorXd last_values_;
   mutable Eigen::MatrixXd last_;
   Eigen::MatrixXd evaluate(const Eigen::VectorXd& values) const;
@@ -72,6 +94,12 @@ struct TermFit {
   std::vector<PlacedTerm> placed;
   std::vector<Eigen::VectorXd> errors;  // of the coefficients, then the constants, of each placed term
 };
+
+/// Holds the coefficients of whole terms at 1, and at 0 those whose column is, to a thousandth of its length, a
+/// combination of the derivatives by the free parameters and of the term's columns before it: C cos q + S sin q beside
+/// a mass, whose derivative is cos q, leaves S to the term and the rest to the mass.
+void hold(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
+          std::vector<PlacedTerm>& placed);
 
 TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
                   const std::vector<PlacedTerm>& placed);
@@ -112,6 +140,10 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
 /// what is left.
 double trial_error(const TermModel& model, const TermData& data, const TrialGround& ground, const PlacedTerm& placed,
                    const Eigen::MatrixXd& simulated);
+
+/// Constants within the values tried and a step beyond; those of positive constants stay positive. A fit may ask for
+/// others on its way, at which a term need not be finite.
+Eigen::VectorXd within_range(const ModelTerm& term, Eigen::VectorXd constants);
 
 /// The distance between the values tried around `value`.
 double spacing(const std::vector<double>& tried, double value);

@@ -25,6 +25,12 @@ EffectCandidate candidate_of(const TermModel& model, const TermData& data, const
   candidate.signature = stacked_signature(model, data, option, simulated);
   candidate.lower = term.lower;
   candidate.upper = term.upper;
+  if (term.whole) {
+    // A search fits a coefficient: where it is far from 1, the constants are those of another function.
+    constexpr double far = 2.0;
+    candidate.lower = Eigen::VectorXd::Constant(candidate.signature.cols(), 1.0 / far);
+    candidate.upper = Eigen::VectorXd::Constant(candidate.signature.cols(), far);
+  }
   candidate.generic = term.generic;
   candidate.prior_cost = option.prior_cost;
   candidate.complexity = term.complexity;
@@ -126,7 +132,7 @@ TermData without_samples(const TermData& data, const std::vector<std::size_t>& l
   }
   TermData result{{}, data.measured(kept, Eigen::all), data.sigma, {}, data.independent_share};
   for (const Eigen::Index i : kept) {
-    result.samples.add(data.samples.rows_of(i));
+    result.samples.add(data.samples, i);
     if (!data.stretches.empty()) result.stretches.push_back(data.stretches[i]);
   }
   return result;
@@ -155,6 +161,8 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   }
   for (const std::size_t sample : outliers) ground.residuals.segment(sample * d, d).setZero();
   const Rivals rivals(model, data, fit, outliers);
+  std::vector<PlacedTerm> of_regimes;
+  double trials_of_regimes = 0.0;
   for (std::size_t t = 0; t < model.terms().size(); ++t) {
     const ModelTerm& term = model.terms()[t];
     if (model.is_refuted(t)) continue;
@@ -166,6 +174,11 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
       std::vector<PlacedTerm> options;
       if (!term.constants.empty()) {
         options = best_constants(model, data, ground, t, o, simulated, fit.placed);
+        if (!term.regime.empty()) {
+          trials_of_regimes += static_cast<double>(term.constants.front().tried.size());
+          std::ranges::move(options, std::back_inserter(of_regimes));
+          continue;
+        }
         for (PlacedTerm& option : rivals.options(t, o, simulated)) options.push_back(std::move(option));
       } else if (!placed_already(fit.placed, t, o)) {
         options.push_back({t, o, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0});
@@ -175,6 +188,16 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
         question.options.push_back(std::move(option));
       }
     }
+  }
+  // Of the many terms times thresholds only those compete that explain most; each is the best of so many.
+  constexpr std::size_t most_of_regimes = 20;
+  std::ranges::stable_sort(of_regimes, std::greater<>{}, &PlacedTerm::explained);
+  const std::size_t kept = std::min(most_of_regimes, of_regimes.size());
+  for (std::size_t k = 0; k < kept; ++k) {
+    PlacedTerm& option = of_regimes[k];
+    option.prior_cost = 2.0 * std::log(trials_of_regimes / static_cast<double>(kept));
+    question.candidates.push_back(candidate_of(model, data, option, simulated, slots.next(model, option), noise));
+    question.options.push_back(std::move(option));
   }
   return question;
 }

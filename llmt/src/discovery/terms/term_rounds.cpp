@@ -8,6 +8,7 @@
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/term_question.hpp"
 #include "llmt/discovery/rounds.hpp"
+#include "llmt/discovery/search.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -61,7 +62,9 @@ Settled search_until_settled(const TermModel& model, TermData& data, const std::
     settled.verdict = search(settled.question.evidence, settled.question.candidates, options.search);
     work.did(share_of_half_a_round * work.left());
     const TermData kept = without_samples(data, settled.verdict.outliers);
-    settled.fit = fit_terms(model, kept, settled.fit.parameters, found_terms(settled.question, settled.verdict));
+    std::vector<PlacedTerm> found = found_terms(settled.question, settled.verdict);
+    hold(model, kept, settled.fit.parameters, found);
+    settled.fit = fit_terms(model, kept, settled.fit.parameters, found);
     if (retry_constants(model, kept, settled.fit)) {
       settled.fit = fit_terms(model, kept, settled.fit.parameters, settled.fit.placed);
     }

@@ -43,12 +43,20 @@ class Trials {
 
   double gain(const Eigen::VectorXd& constants) {
     placed_.constants = constants;
-    const Eigen::MatrixXd of_rows = model_->columns(placed_, *simulated_);
-    Eigen::MatrixXd columns = means(of_rows, data_->samples);
+    const bool is_coarse =
+        is_coarse_ && data_->samples.is_filtered() && model_->terms()[placed_.term].inner_state.empty();
+    const Eigen::MatrixXd of_rows = is_coarse ? model_->columns_at(placed_, *simulated_, data_->samples.rows())
+                                              : model_->columns(placed_, *simulated_);
+    Eigen::MatrixXd columns = is_coarse ? of_rows : means(of_rows, data_->samples);
     if (!columns.allFinite()) return 0.0;
     for (Eigen::Index k = 0; k < columns.cols(); ++k) {
-      if (share_kept(of_rows.col(k), data_->samples) < smallest_share_kept) return 0.0;
+      if (!is_coarse && share_kept(of_rows.col(k), columns.col(k), data_->samples) < smallest_share_kept) return 0.0;
       if (carriers(columns.col(k)) < fewest_carriers_) return 0.0;
+    }
+    if (model_->terms()[placed_.term].whole) {
+      const Eigen::VectorXd whole = columns.rowwise().sum() / data_->sigma(placed_.output);
+      const Eigen::VectorXd own = whole - basis_ * (basis_.transpose() * whole);
+      return std::max(0.0, 2.0 * own.dot(residuals_) - own.squaredNorm());
     }
     const Eigen::VectorXd norms = columns.colwise().norm();
     if (!(norms.minCoeff() > 0.0)) return 0.0;
@@ -64,6 +72,10 @@ class Trials {
 
   double sum_of_squares() const { return residuals_.squaredNorm(); }
 
+  /// Many values are tried at the rows of the samples alone, as if nothing had been filtered; what is best there is
+  /// then tried as it is.
+  void be_coarse(bool is_coarse) { is_coarse_ = is_coarse; }
+
   const PlacedTerm& at(const Eigen::VectorXd& constants) {
     placed_.constants = constants;
     return placed_;
@@ -75,6 +87,7 @@ class Trials {
   PlacedTerm placed_;
   const Eigen::MatrixXd* simulated_;
   double fewest_carriers_;
+  bool is_coarse_ = false;
   Eigen::MatrixXd basis_;
   Eigen::VectorXd residuals_;
 
@@ -127,7 +140,34 @@ Eigen::VectorXd refined(Trials& trials, const std::vector<TermConstant>& constan
   return values;
 }
 
+// The best of the places between the neighbours of a threshold, which few were tried of.
+double refined_threshold(Trials& trials, const std::vector<double>& tried, double best, double gain) {
+  constexpr int places = 40;
+  const auto above = std::ranges::upper_bound(tried, best);
+  const auto below = std::ranges::lower_bound(tried, best);
+  const double low = below == tried.begin() ? best : *(below - 1);
+  const double high = above == tried.end() ? best : *above;
+  for (int k = 1; k < places; ++k) {
+    const double trial = low + (high - low) * k / places;
+    const double own = trials.gain(Eigen::VectorXd::Constant(1, trial));
+    if (!(own > gain)) continue;
+    gain = own;
+    best = trial;
+  }
+  return best;
+}
+
 }  // namespace
+
+Eigen::VectorXd within_range(const ModelTerm& term, Eigen::VectorXd constants) {
+  for (Eigen::Index k = 0; k < constants.size(); ++k) {
+    const std::vector<double>& tried = term.constants[static_cast<std::size_t>(k)].tried;
+    double low = tried.front() - spacing(tried, tried.front());
+    if (tried.front() > 0.0) low = std::max(low, 0.5 * tried.front());
+    constants(k) = std::clamp(constants(k), low, tried.back() + spacing(tried, tried.back()));
+  }
+  return constants;
+}
 
 double spacing(const std::vector<double>& tried, double value) {
   if (tried.size() < 2) return std::max(1e-300, 0.01 * std::abs(value));
@@ -169,6 +209,7 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
                     .prior_cost = own.prior_cost + 2.0 * std::log(static_cast<double>(tried.size()))};
   Trials trials(model, data, ground, placed, simulated);
   std::vector<double> gains;
+  trials.be_coarse(true);
   for (const Eigen::VectorXd& values : tried) gains.push_back(trials.gain(values));
   std::vector<std::size_t> order(gains.size());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
@@ -187,7 +228,16 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
     const double value = tried[k](0);
     if (std::ranges::any_of(places, [&](double place) { return near(value, place); })) continue;
     places.push_back(value);
-    best.push_back(trials.at(refined(trials, own.constants, tried[k], gains[k])));
+    Eigen::VectorXd constants = tried[k];
+    if (own.regime.empty()) {
+      trials.be_coarse(false);
+      constants = refined(trials, own.constants, constants, trials.gain(constants));
+      trials.be_coarse(true);
+    } else {
+      constants(0) = refined_threshold(trials, constant.tried, constants(0), gains[k]);
+    }
+    best.push_back(trials.at(constants));
+    best.back().explained = gains[k];
   }
   return best;
 }

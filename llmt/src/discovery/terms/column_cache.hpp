@@ -1,0 +1,36 @@
+// Columns of terms that no search changes.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "discovery/terms/samples.hpp"
+#include "llmt/discovery/model_term.hpp"
+
+namespace llmt::discovery {
+
+/// A term without constants that is a function of the inputs alone is the same in every search of the same rows. It is
+/// computed at all rows and filtered once, at all rows that may be samples.
+class ColumnCache {
+ public:
+  /// Inputs::cutoff is above 0.
+  explicit ColumnCache(const Inputs& inputs);
+
+  static bool holds(const ModelTerm& term);
+
+  /// samples x k. `draw`: 0 for the inputs as they are, else the number of the draw of their errors. `columns` computes
+  /// them at all rows.
+  Eigen::MatrixXd at(const Samples& samples, std::size_t draw, std::size_t term,
+                     const std::function<Eigen::MatrixXd()>& columns);
+
+ private:
+  Samples all_;
+  std::vector<Eigen::Index> places_;  // of each row among them; -1: none
+  std::map<std::pair<std::size_t, std::size_t>, Eigen::MatrixXd> columns_;
+};
+
+}  // namespace llmt::discovery

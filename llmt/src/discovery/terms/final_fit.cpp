@@ -1,0 +1,75 @@
+#include "discovery/terms/final_fit.hpp"
+
+#include <algorithm>
+
+#include "discovery/terms/errors_of_inputs.hpp"
+#include "discovery/terms/fitted_parameters.hpp"
+#include "discovery/terms/missing_findings.hpp"
+#include "discovery/terms/row_filter.hpp"
+#include "discovery/terms/row_split.hpp"
+#include "discovery/terms/standstill.hpp"
+#include "discovery/terms/term_question.hpp"
+#include "discovery/terms/term_rounds.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+// Sums keep the parts that the search has found.
+void move_parameters(const TermFit& fit, const TermFit& alone, double false_alarm_rate, Missing& missing) {
+  for (FittedParameter& fitted : missing.fitted_parameters) {
+    const auto first = std::ranges::find(missing.parameters, fitted.parts.front(), &Parameter::name);
+    const auto k = first - missing.parameters.begin();
+    const double nominal = first->value - fitted.change;
+    fitted.change = fit.parameters(k) - nominal;
+    fitted.alone = alone.parameters(k) - nominal;
+    fitted.standard_error = fit.parameter_errors(k);
+    fitted.changed = is_beyond_chance(fitted, false_alarm_rate);
+  }
+  for (std::size_t k = 0; k < missing.parameters.size(); ++k) missing.parameters[k].value = fit.parameters(k);
+  missing.standard_errors = fit.parameter_errors;
+}
+
+}  // namespace
+
+void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                     const std::vector<ModelTerm>& terms, const SearchedRows& rows, const MissingOptions& options,
+                     Missing& missing) {
+  if (missing.held_out.empty() || missing.answer == Answer::failed_held_out) return;
+  Simulation distinct = simulation;
+  distinct.parameters = missing.parameters;
+  TermModel model(distinct, inputs, measured.names, terms);
+  model.share(rows.columns, 0);
+  Eigen::VectorXd start(std::ssize(missing.parameters));
+  for (std::size_t k = 0; k < missing.parameters.size(); ++k) start(k) = missing.parameters[k].value;
+  MissingOptions nothing_aside = options;
+  nothing_aside.held_out_share = 0.0;
+  const bool in_time = inputs.instants.size() > 0;
+  RowSplit split =
+      in_time ? split_in_time(inputs, nothing_aside, rows.fewest_samples) : split_independent(inputs, nothing_aside);
+  std::vector<bool> apart = rows.apart;
+  apart.resize(inputs.values.rows(), false);
+  for (const Eigen::Index row : missing.outliers) apart[row] = true;
+  split = without_rows(split, apart);
+  ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
+  TermData data{.samples = split.searched,
+                .measured = means_of_filtered(measured.values, split.searched),
+                .sigma = Eigen::VectorXd::Ones(measured.values.cols()),
+                .stretches = split.stretches,
+                .independent_share = missing.time.independent_share};
+  std::vector<PlacedTerm> placed;
+  for (const FoundTerm& found : missing.found) {
+    placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
+  }
+  data.sigma = scatter(model, data, {start, {}, placed, {}});
+  hold(model, data, start, placed);
+  TermFit fit = fit_terms(model, data, start, placed);
+  const TermFit alone = fit_terms(model, data, start, {});
+  set_trial_errors(model, data, fit);
+  correct_estimates(errors, data, fit);
+  for (std::size_t k = 0; k < missing.found.size(); ++k) set_estimates(fit.placed[k], fit.errors[k], missing.found[k]);
+  move_parameters(fit, alone, options.search.false_alarm_rate, missing);
+  missing.before = as_measured(inputs, model.predict(alone.parameters, {}));
+  missing.corrected = as_measured(inputs, model.predict(fit.parameters, fit.placed));
+}
+
+}  // namespace llmt::discovery

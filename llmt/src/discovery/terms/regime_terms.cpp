@@ -1,0 +1,77 @@
+// Terms that act beyond a threshold of an input.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "discovery/terms/term_builders.hpp"
+#include "llmt/discovery/terms.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+// Both sides have some rows; further out there is next to nothing to see.
+std::vector<double> quantiles(const Inputs& inputs, Eigen::Index column) {
+  constexpr std::size_t count = 20;
+  constexpr std::size_t share = 20;  // of the values that are beyond the outermost threshold: one of so many
+  std::vector<double> values(inputs.values.col(column).begin(), inputs.values.col(column).end());
+  std::ranges::sort(values);
+  std::vector<double> distinct = values;
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  std::vector<double> tried;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t outer = values.size() / share;
+    const double value = values[outer + k * (values.size() - 1 - 2 * outer) / (count - 1)];
+    const auto next = std::ranges::upper_bound(distinct, value);
+    if (next == distinct.end()) break;
+    const double between = 0.5 * (value + *next);
+    if (tried.empty() || between > tried.back()) tried.push_back(between);
+  }
+  return tried;
+}
+
+ModelTerm in_regime(const ModelTerm& term, const std::string& gate, Eigen::Index column, std::vector<double> tried,
+                    bool above) {
+  const char* sign = above ? ">" : "<=";
+  ModelTerm own = term;
+  own.location += fmt::format("{}where {} {} c", own.location.empty() ? "" : " ", gate, sign);
+  own.formula = fmt::format("({}) [{} {} c]", term.formula, gate, sign);
+  own.regime = gate;
+  auto place = std::ranges::find(own.inputs, gate);
+  if (place == own.inputs.end()) place = own.inputs.insert(place, gate);
+  const auto number = place - own.inputs.begin() + 1;
+  for (std::string& code : own.code) code = fmt::format("({})*(${} {} $c)", code, number, sign);
+  own.constants = {{.name = "c", .unit = gate, .tried = std::move(tried), .smooth = false}};
+  own.columns = [columns = term.columns, column, above](const Rows& rows, const Eigen::VectorXd& constants) {
+    Eigen::MatrixXd values = columns(rows, {});
+    const Eigen::ArrayXd gates = rows.inputs.col(column).array();
+    for (Eigen::Index i = 0; i < values.rows(); ++i) {
+      if ((gates(i) > constants(0)) != above) values.row(i).setZero();
+    }
+    return values;
+  };
+  constexpr int beyond_others = 12;
+  own.complexity = term.complexity + beyond_others;
+  return own;
+}
+
+}  // namespace
+
+std::vector<ModelTerm> regime_terms(const Inputs& inputs, const std::vector<ModelTerm>& library) {
+  constexpr int a_product = 6;
+  constexpr std::size_t fewest = 4;
+  std::vector<ModelTerm> terms;
+  for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
+    if (inputs.names[j] == inputs.order) continue;
+    const std::vector<double> tried = quantiles(inputs, j);
+    if (tried.size() < fewest) continue;
+    for (const ModelTerm& term : library) {
+      const bool is_plain = term.constants.empty() && !term.generic && !term.history && term.inner_state.empty();
+      // An offset beyond a threshold is the term step.
+      if (!is_plain || term.complexity > a_product || term.family == "offset" || term.code.empty()) continue;
+      for (const bool above : {true, false}) terms.push_back(in_regime(term, inputs.names[j], j, tried, above));
+    }
+  }
+  return terms;
+}
+
+}  // namespace llmt::discovery

@@ -1,0 +1,53 @@
+#include "discovery/terms/row_filter.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "discovery/signals/kernel.hpp"
+#include "discovery/terms/derivatives.hpp"
+#include "discovery/terms/refuse.hpp"
+#include "llmt/discovery/terms.hpp"
+
+namespace llmt::discovery {
+
+RowFilter::RowFilter(const Inputs& inputs) {
+  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
+  step_ = median_step(rows);
+  constexpr double uneven = 0.5;  // steps
+  for (std::size_t k = 0; k < rows.sequence.size(); ++k) {
+    const double step = k == 0 ? 0.0 : rows.instants(rows.sequence[k]) - rows.instants(rows.sequence[k - 1]);
+    if (k == 0 || !(std::abs(step - step_) < uneven * step_)) pieces_.emplace_back();
+    pieces_.back().push_back(rows.sequence[k]);
+  }
+  stride_ = step_ > 0.0 ? independent_step(inputs.cutoff, step_) : 1;
+  if (stride_ < 2) {
+    refuse("find_missing",
+           fmt::format("rows are {:.4g} apart, too far to filter the simulation at {:.4g} per unit of time "
+                       "as the measured outputs were",
+                       step_, inputs.cutoff));
+  }
+  weights_ = low_pass(inputs.cutoff, step_);
+}
+
+Eigen::MatrixXd RowFilter::operator()(const Eigen::MatrixXd& of_rows) const {
+  Eigen::MatrixXd filtered = of_rows;
+  const Eigen::Index half = weights_.size() / 2;
+  for (const std::vector<Eigen::Index>& piece : pieces_) {
+    const Eigen::MatrixXd own = of_rows(piece, Eigen::all);
+    for (Eigen::Index k = 0; k < own.rows(); ++k) {
+      const Eigen::Index begin = std::max<Eigen::Index>(0, k - half);
+      const Eigen::Index count = std::min(own.rows(), k + half + 1) - begin;
+      const auto weights = weights_.segment(begin - (k - half), count);
+      filtered.row(piece[k]) = weights.transpose() * own.middleRows(begin, count) / weights.sum();
+    }
+  }
+  return filtered;
+}
+
+Eigen::MatrixXd as_measured(const Inputs& inputs, const Eigen::MatrixXd& of_rows) {
+  return inputs.cutoff > 0.0 ? RowFilter(inputs)(of_rows) : of_rows;
+}
+
+}  // namespace llmt::discovery

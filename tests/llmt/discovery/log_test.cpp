@@ -1,0 +1,213 @@
+// From a raw log to an answer: rows by signals(), a simulation at them, find_missing().
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "discovery/terms/input_noise.hpp"
+#include "discovery/terms/row_filter.hpp"
+#include "llmt/discovery/search.hpp"
+#include "llmt/discovery/signals.hpp"
+#include "llmt/discovery/simulation.hpp"
+#include "llmt/discovery/terms.hpp"
+#include "llmt/random.hpp"
+
+namespace log_test {
+namespace {
+
+using namespace llmt::discovery;
+
+constexpr double inertia = 0.4;
+constexpr double viscous = 1.1;
+constexpr double gravity = 9.0;
+constexpr double rate = 250.0;
+constexpr Eigen::Index samples = 8000;
+
+// Position, speed, acceleration of a joint that reverses about once a second.
+Eigen::Vector3d motion(double t) {
+  Eigen::Vector3d state = Eigen::Vector3d::Zero();
+  double phase = 0.3;
+  for (const double w : {1.1, 2.3, 3.7}) {
+    const double size = 0.9 / w;
+    state +=
+        size * Eigen::Vector3d(std::sin(w * t + phase), w * std::cos(w * t + phase), -w * w * std::sin(w * t + phase));
+    phase += 1.9;
+  }
+  return state;
+}
+
+struct Model {
+  double dry = 0.0;
+
+  double torque(const Eigen::Vector3d& x) const {
+    const double sign = x(1) > 0.0 ? 1.0 : x(1) < 0.0 ? -1.0 : 0.0;
+    return inertia * x(2) + viscous * x(1) + gravity * std::cos(x(0)) + dry * sign;
+  }
+};
+
+struct Rows {
+  Inputs inputs;
+  Eigen::MatrixXd simulated;
+  MeasuredOutputs measured;
+};
+
+// `torque(t)` is what is measured, with white noise; the encoder has noise of 1e-5 rad.
+Rows rows_of_log(std::uint64_t seed, const Model& model, double noise, const std::function<double(double)>& torque,
+                 SignalsOptions options = {.cutoff = 6.0}) {
+  llmt::Random random(seed);
+  Log log;
+  log.time = Eigen::VectorXd::LinSpaced(samples, 0.0, static_cast<double>(samples - 1)) / rate;
+  log.positions = log.time.unaryExpr([&](double t) { return motion(t)(0) + 1e-5 * random.normal(); });
+  log.torques = log.time.unaryExpr([&](double t) { return torque(t) + noise * random.normal(); });
+  const Signals table = signals(log, options);
+  Rows rows;
+  rows.inputs.names = {"q", "dq", "ddq"};
+  rows.inputs.values.resize(table.time.size(), 3);
+  rows.inputs.values << table.positions, table.velocities, table.accelerations;
+  rows.inputs.instants = table.time;
+  rows.inputs.cutoff = table.dense ? options.cutoff : 0.0;
+  const ColumnNoise& position = table.position_noise[0];
+  rows.inputs.noise = Eigen::Vector3d(position.in_table, position.of_velocity, position.of_acceleration);
+  rows.measured = {{"u"}, table.torques, Eigen::VectorXd::Constant(1, table.torque_noise[0].in_table)};
+  rows.simulated.resize(table.time.size(), 1);
+  for (Eigen::Index i = 0; i < rows.simulated.rows(); ++i) {
+    rows.simulated(i, 0) = model.torque(rows.inputs.values.row(i).transpose());
+  }
+  return rows;
+}
+
+Missing missing_from(const Rows& rows) {
+  std::vector<ModelTerm> terms = standard_terms(rows.inputs);
+  for (ModelTerm& term : regime_terms(rows.inputs, terms)) terms.push_back(std::move(term));
+  for (ModelTerm& term : inner_state_terms(rows.inputs, rows.simulated, {"u"})) terms.push_back(std::move(term));
+  return find_missing(tabulated(rows.simulated, {"u"}), rows.inputs, rows.measured, terms);
+}
+
+TEST(FilteredRows, AreWeightedSumsThatEndWhereTheRecordingDoes) {
+  constexpr Eigen::Index n = 60;
+  Inputs inputs{{"x"}, Eigen::VectorXd::LinSpaced(n, 0.0, 1.0)};
+  inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, n - 1.0);
+  inputs.instants.tail(20).array() += 5.0;  // a gap before row 40
+  inputs.cutoff = 0.05;
+  const RowFilter filter(inputs);
+  ASSERT_EQ(filter.pieces().size(), 2u);
+  EXPECT_NEAR(filter.weights().sum(), 1.0, 1e-12);
+  Eigen::VectorXd values(n);
+  for (Eigen::Index i = 0; i < n; ++i) values(i) = std::sin(0.37 * static_cast<double>(i * i));
+  const Eigen::MatrixXd filtered = filter(values);
+  const Eigen::Index half = filter.weights().size() / 2;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    double sum = 0.0;
+    double weight = 0.0;
+    for (Eigen::Index k = -half; k <= half; ++k) {
+      const Eigen::Index j = i + k;
+      if (j < 0 || j >= n || (j < 40) != (i < 40)) continue;
+      sum += filter.weights()(half + k) * values(j);
+      weight += filter.weights()(half + k);
+    }
+    EXPECT_NEAR(filtered(i, 0), sum / weight, 1e-12) << i;
+  }
+  EXPECT_EQ(as_measured({{"x"}, inputs.values}, values), values);
+}
+
+// Dry friction that the model has: the filter of the log rounds it at every reversal.
+TEST(FilteredRows, ACompleteModelWithDryFrictionLacksNothing) {
+  const Model model{.dry = 2.0};
+  const auto torque = [&](double t) { return model.torque(motion(t)); };
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const Rows rows = rows_of_log(seed, model, 0.05, torque);
+    const Missing missing = missing_from(rows);
+    EXPECT_EQ(missing.answer, Answer::nothing_missing) << seed;
+    EXPECT_LT(missing.gaps[0].after, 3.0 * missing.gaps[0].known_noise);
+    // As they stand, the rows at reversals deviate by more than the noise.
+    const Eigen::ArrayXd deviations = (rows.measured.values - rows.simulated).array();
+    EXPECT_GT(deviations.abs().maxCoeff(), 20.0 * missing.gaps[0].known_noise);
+  }
+}
+
+TEST(FilteredRows, AStateIsFoundBesideDryFriction) {
+  const Model model{.dry = 2.0};
+  for (const double delay : {0.03, -0.03}) {
+    const Missing missing =
+        missing_from(rows_of_log(1, model, 0.05, [&](double t) { return model.torque(motion(t - delay)); }));
+    EXPECT_EQ(missing.answer, Answer::inner_state) << delay;
+    ASSERT_EQ(missing.found.size(), 1u) << delay;
+    EXPECT_EQ(missing.found.front().family, "delay");
+    EXPECT_NEAR(missing.found.front().values.front().value, delay, 0.002);
+  }
+}
+
+// Noise that is alike in neighbours may be as large as it likes, but not larger than what is known of it.
+TEST(KnownNoise, BoundsTheAllClear) {
+  const Model model;
+  // A slow wave that no input follows.
+  const auto torque = [&](double t) {
+    return model.torque(motion(t)) + 0.6 * std::sin(5.3 * t + 2.0 * std::sin(0.7 * t));
+  };
+  Rows rows = rows_of_log(1, model, 0.01, torque);
+  const Missing bounded = missing_from(rows);
+  EXPECT_TRUE(bounded.answer == Answer::undecided || bounded.answer == Answer::unknown) << to_string(bounded.answer);
+  EXPECT_TRUE(std::ranges::none_of(bounded.found, &FoundTerm::confirmed));
+  EXPECT_GT(bounded.gaps[0].after, 20.0 * bounded.gaps[0].known_noise);
+  rows.measured.noise.setConstant(0.5);
+  EXPECT_NE(missing_from(rows).answer, Answer::undecided);
+}
+
+TEST(Regimes, AnEffectBeyondAThresholdIsNamedWithIt) {
+  const Model model;
+  constexpr double threshold = 0.25;
+  const auto torque = [&](double t) {
+    const Eigen::Vector3d x = motion(t);
+    return model.torque(x) + (x(0) > threshold ? 0.5 * x(1) : 0.0);
+  };
+  for (const std::uint64_t seed : {1u, 2u}) {
+    const Missing missing = missing_from(rows_of_log(seed, model, 0.05, torque));
+    EXPECT_EQ(missing.answer, Answer::named) << seed << to_string(missing.answer);
+    ASSERT_EQ(missing.found.size(), 1u);
+    const FoundTerm& found = missing.found.front();
+    EXPECT_EQ(found.family, "linear");
+    EXPECT_EQ(found.location, "dq where q > c");
+    EXPECT_EQ(found.regime, "q");
+    EXPECT_NEAR(found.constants(0), threshold, 0.05);
+    EXPECT_NEAR(found.coefficients(0), 0.5, 0.02);
+  }
+}
+
+// Beside a free mass, whose derivative is cos q, the term C cos q + S sin q says S, and the mass the rest.
+TEST(HeldCoefficients, WhatAParameterSaysIsLeftToIt) {
+  const Model model;
+  constexpr double zero = 0.04;  // of the encoder
+  Rows rows = rows_of_log(1, model, 0.05, [&](double t) {
+    const Eigen::Vector3d x = motion(t);
+    return model.torque(x) + 9.9 * std::cos(x(0) + zero) - gravity * std::cos(x(0));
+  });
+  const Simulation simulation =
+      linearised(tabulated(rows.simulated, {"u"}), rows.simulated, {{.name = "G", .unit = "N m", .value = gravity}},
+                 {Eigen::MatrixXd(rows.inputs.values.col(0).array().cos())});
+  const Missing missing = find_missing(simulation, rows.inputs, rows.measured, standard_terms(rows.inputs));
+  ASSERT_EQ(missing.found.size(), 1u);
+  EXPECT_EQ(missing.answer, Answer::named);
+  EXPECT_EQ(missing.found.front().family, "harmonic1");
+  EXPECT_EQ(missing.found.front().coefficients(0), 0.0);
+  EXPECT_NEAR(missing.found.front().coefficients(1), -9.9 * std::sin(zero), 0.02);
+  ASSERT_EQ(missing.fitted_parameters.size(), 1u);
+  EXPECT_NEAR(missing.fitted_parameters[0].change, 9.9 * std::cos(zero) - gravity, 0.02);
+  EXPECT_TRUE(missing.fitted_parameters[0].changed);
+  EXPECT_LT(missing.fitted_parameters[0].standard_error, 0.01);
+}
+
+// Noise of inputs is that of the highest frequencies: a motion without noise has next to none.
+TEST(HighDifferences, HoldNoMotion) {
+  Inputs inputs{{"q", "dq", "ddq"}, Eigen::MatrixXd(400, 3)};
+  inputs.instants = Eigen::VectorXd::LinSpaced(400, 0.0, 399 * 0.08);
+  for (Eigen::Index i = 0; i < 400; ++i) inputs.values.row(i) = motion(inputs.instants(i)).transpose();
+  const Eigen::MatrixXd covariance = noise_in_time(rows_of(inputs, Eigen::VectorXd::Zero(400)), inputs);
+  for (Eigen::Index j = 0; j < 3; ++j) {
+    const double spread = std::sqrt((inputs.values.col(j).array() - inputs.values.col(j).mean()).square().mean());
+    EXPECT_LT(std::sqrt(covariance(j, j)), 2e-4 * spread) << j;
+  }
+}
+
+}  // namespace
+}  // namespace log_test
