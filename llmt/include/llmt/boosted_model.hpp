@@ -44,12 +44,14 @@ class BoostedModel {
   ///   lower, upper = f(x) -+ the floor((1 - level) (n + 1))-th largest of s_p(i)(x) S_i,
   /// as in normalised split conformal prediction (Lei et al. 2018). They are about right: the trees of all rows are a
   /// little better than those of the residuals, whose rows decided where these stopped. Throws std::invalid_argument if
-  /// there are no residuals, too few for the level, or if the level is not between 0 and 1, and as predict().
-  Bounds intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0) const;
+  /// there are no residuals, too few for the level, or if the level is not between 0 and 1, and as predict() and
+  /// check_row_weights(). `weights`: as of Intervals::predict().
+  Bounds intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0,
+                   const Eigen::VectorXd& weights = {}) const;
 
   /// The same for several levels.
   std::vector<Bounds> intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<double>& levels,
-                                int max_threads = 0) const;
+                                int max_threads = 0, const Eigen::VectorXd& weights = {}) const;
 
  private:
   std::vector<InputColumn> inputs_;
@@ -61,7 +63,8 @@ class BoostedModel {
 /// Quantiles of each output, rows x probabilities; see quantiles_from(). Throws std::invalid_argument as
 /// levels_of_quantiles() and BoostedModel::intervals().
 std::vector<Eigen::MatrixXd> quantiles(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                       const std::vector<double>& probabilities, int max_threads = 0);
+                                       const std::vector<double>& probabilities, int max_threads = 0,
+                                       const Eigen::VectorXd& weights = {});
 
 /// How large a model is, over all outputs.
 struct BoostedSize {

@@ -36,7 +36,11 @@ struct HeldOutPart {
 /// So the width follows the size of the errors near x. The guarantee is a coverage of 1 - 2 a for exchangeable rows; in
 /// practice it is near 1 - a, the level that is asked for. A single fold is dealt to five parts, which share its model:
 /// the spread of a part is learnt from the others. This is split conformal prediction. Below 100 held-out rows the
-/// spread is 1. Weights of rows are not used.
+/// spread does not depend on x.
+///
+/// Weights of the training rows that are no counts say how well a row is known, so that a new row has a weight of its
+/// own: sigma(x, w) of Spread. Without weights of the new rows the intervals are those of rows of the median weight of
+/// the held-out rows.
 ///
 /// Rows that lack an input which the models use (an empty cell, an unknown category) err more than complete rows. The
 /// two kinds of rows are therefore calibrated apart: n and S_i are those of the held-out rows of the kind of x. If
@@ -63,12 +67,14 @@ class Intervals {
 
   /// Intervals that contain the fraction `level` (0.9, for example) of the outputs. Throws std::invalid_argument if
   /// there are no folds, the level is not between 0 and 1, or there are too few held-out rows of both kinds together
-  /// for it, and as Model::predict().
-  Bounds predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0) const;
+  /// for it, and as Model::predict(). `weights`: of the rows, in the unit of those in training; empty: the median one.
+  /// Throws std::invalid_argument as check_row_weights().
+  Bounds predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0,
+                 const Eigen::VectorXd& weights = {}) const;
 
   /// The same for several levels, in the time of little more than one.
   std::vector<Bounds> predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<double>& levels,
-                              int max_threads = 0) const;
+                              int max_threads = 0, const Eigen::VectorXd& weights = {}) const;
 
  private:
   std::vector<Model> models_;
@@ -84,7 +90,8 @@ struct ModelWithIntervals {
 /// Quantiles of each output, rows x probabilities; see quantiles_from(). Throws std::invalid_argument as
 /// levels_of_quantiles() and Intervals::predict().
 std::vector<Eigen::MatrixXd> quantiles(const ModelWithIntervals& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                       const std::vector<double>& probabilities, int max_threads = 0);
+                                       const std::vector<double>& probabilities, int max_threads = 0,
+                                       const Eigen::VectorXd& weights = {});
 
 /// The text of to_json(model) with the intervals as one member more, if there are any. Throws std::invalid_argument if
 /// the intervals belong to another model: if a model of theirs has other numbers of inputs, outputs or levels, names

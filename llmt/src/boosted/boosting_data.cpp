@@ -248,6 +248,7 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
   result.y = given.outputs.values(different.first, Eigen::all);
   result.rows.weights = Eigen::Map<const Eigen::VectorXd>(different.weights.data(), count);
   if (given.weights.size() > 0 && !given.are_counts) result.rows.weights /= result.rows.weights.mean();
+  if (given.weights.size() > 0 && !given.are_counts) result.precisions = given.weights(different.first);
   result.rows.equal_weights = (result.rows.weights.array() == 1.0).all();
   describe_columns(data, given, result);
   if (few) return result;  // nothing can be held out

@@ -43,15 +43,18 @@ std::vector<SumResiduals> held_out_residuals(const BoostingData& data, Eigen::In
   const Eigen::MatrixXd x = with_empty_levels(data.inputs, data.x(of.rows, Eigen::all));
   const Eigen::VectorXd predictions = data.y.col(output)(of.rows) - residuals;
   const Eigen::VectorXd errors = residuals.cwiseAbs();
-  const std::vector<Spread> spreads = fit_spreads({x, data.inputs, predictions, errors}, of.part, of.parts);
-  if (std::ranges::all_of(spreads, [](const Spread& spread) { return spread.nodes.empty(); })) {
+  const Eigen::VectorXd weights = data.precisions.size() > 0 ? data.precisions(of.rows).eval() : Eigen::VectorXd();
+  const std::vector<Spread> spreads = fit_spreads({x, data.inputs, predictions, errors, weights}, of.part, of.parts);
+  if (std::ranges::all_of(spreads, &Spread::is_even)) {
     return {{ascending({errors.begin(), errors.end()}, most)}};
   }
   std::vector<SumResiduals> parts;
   for (int p = 0; p < of.parts; ++p) {
     std::vector<double> scaled;
     for (Eigen::Index i = 0; i < errors.size(); ++i) {
-      if (of.part[i] == p) scaled.push_back(errors(i) / spread_at(spreads[p], x, i, predictions(i)));
+      if (of.part[i] != p) continue;
+      const double spread = spread_at(spreads[p], x, i, predictions(i));
+      scaled.push_back(errors(i) / (weights.size() > 0 ? spread * factor_of_weight(spreads[p], weights(i)) : spread));
     }
     parts.push_back({ascending(std::move(scaled), most / static_cast<std::size_t>(of.parts)), spreads[p]});
   }

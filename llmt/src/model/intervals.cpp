@@ -191,15 +191,18 @@ Intervals::Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> res
                      std::vector<Eigen::MatrixXd> incomplete)
     : Intervals(std::move(models), parts_of(std::move(residuals), std::move(incomplete))) {}
 
-Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads) const {
-  return predict(inputs, std::vector<double>{level}, max_threads).front();
+Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads,
+                          const Eigen::VectorXd& weights) const {
+  return predict(inputs, std::vector<double>{level}, max_threads, weights).front();
 }
 
 std::vector<Bounds> Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                       const std::vector<double>& levels, int max_threads) const {
+                                       const std::vector<double>& levels, int max_threads,
+                                       const Eigen::VectorXd& weights) const {
   if (empty()) {
     refuse_intervals("there are no held-out residuals; fit with folds and with FitOptions::intervals = true");
   }
+  check_row_weights("llmt::Intervals", weights, inputs.rows());
   const Eigen::Index lacking = count_rows(parts_, &HeldOutPart::incomplete);
   std::vector<std::vector<Calibration>> of_complete;
   std::vector<std::vector<Calibration>> of_incomplete;
@@ -229,6 +232,9 @@ std::vector<Bounds> Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& 
           estimates[p] = {prediction, spreads.empty() ? 1.0 : spread_at(spreads[o], at, row, prediction)};
         }
         draw_together(estimates, usual[o]);
+        for (std::size_t p = 0; weights.size() > 0 && p < parts_.size(); ++p) {
+          if (!parts_[p].spreads.empty()) estimates[p].spread *= factor_of_weight(parts_[p].spreads[o], weights(row));
+        }
         for (std::size_t k = 0; k < levels.size(); ++k) {
           const auto& calibrations = incomplete[row] ? of_incomplete[k] : of_complete[k];
           const auto [lower, upper] = hull_at(parts_, estimates, calibrations, o);
@@ -248,8 +254,9 @@ std::vector<Bounds> Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& 
 }
 
 std::vector<Eigen::MatrixXd> quantiles(const ModelWithIntervals& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                       const std::vector<double>& probabilities, int max_threads) {
-  return quantiles_from(model.intervals.predict(inputs, levels_of_quantiles(probabilities), max_threads),
+                                       const std::vector<double>& probabilities, int max_threads,
+                                       const Eigen::VectorXd& weights) {
+  return quantiles_from(model.intervals.predict(inputs, levels_of_quantiles(probabilities), max_threads, weights),
                         model.model.predict(inputs, max_threads), probabilities);
 }
 

@@ -64,7 +64,7 @@ Json of_tree(const BoostedTree& tree) {
 
 // Without spreads as programs before them read it. Those find no residuals where there are some.
 void write_held_out(const std::vector<SumResiduals>& parts, Json& json) {
-  if (parts.size() == 1 && parts.front().spread.nodes.empty()) {
+  if (parts.size() == 1 && parts.front().spread.is_even()) {
     json["residuals"] = parts.front().residuals;
     return;
   }

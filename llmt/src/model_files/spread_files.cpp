@@ -13,6 +13,10 @@ Json json_of(const Spread& spread) {
   }
   Json json = {{"nodes", std::move(nodes)}};
   if (!spread.levels.empty()) json["levels"] = spread.levels;
+  if (spread.noise_share > 0.0) {
+    json["noise_share"] = spread.noise_share;
+    json["usual_weight"] = spread.usual_weight;
+  }
   return json;
 }
 
@@ -34,6 +38,10 @@ Spread spread_from(const JsonReader& json) {
     node.left = parts[3].as<int>();
     node.right = parts[4].as<int>();
     if (node.left < 0) parts[3].fail("it must not be negative");
+  }
+  if (json.has("noise_share")) {
+    spread.noise_share = json.member("noise_share").as<double>();
+    spread.usual_weight = json.member("usual_weight").as<double>();
   }
   if (!json.has("levels")) return spread;
   for (const JsonReader& values : json.member("levels").elements()) spread.levels.push_back(values.list<double>());

@@ -237,12 +237,15 @@ bool BoostedModel::has_intervals() const {
   return std::ranges::none_of(sums_, [](const BoostedSum& sum) { return sum.held_out.empty(); });
 }
 
-Bounds BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads) const {
-  return intervals(inputs, std::vector<double>{level}, max_threads).front();
+Bounds BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads,
+                               const Eigen::VectorXd& weights) const {
+  return intervals(inputs, std::vector<double>{level}, max_threads, weights).front();
 }
 
 std::vector<Bounds> BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                            const std::vector<double>& levels, int max_threads) const {
+                                            const std::vector<double>& levels, int max_threads,
+                                            const Eigen::VectorXd& weights) const {
+  check_row_weights("llmt::BoostedModel::intervals", weights, inputs.rows());
   const Eigen::MatrixXd predicted = predict(inputs, max_threads);
   const Eigen::MatrixXd at = with_empty_levels(inputs_, inputs);
   std::vector<Bounds> bounds(levels.size(), Bounds{predicted, predicted});
@@ -257,7 +260,9 @@ std::vector<Bounds> BoostedModel::intervals(const Eigen::Ref<const Eigen::Matrix
       std::vector<ScaledResiduals> scaled(parts.size());
       for (Eigen::Index row = begin; row < end; ++row) {
         for (std::size_t p = 0; p < parts.size(); ++p) {
-          scaled[p] = {parts[p].residuals, 0.0, spread_at(parts[p].spread, at, row, predicted(row, o))};
+          const double spread = spread_at(parts[p].spread, at, row, predicted(row, o));
+          const double by_weight = weights.size() > 0 ? factor_of_weight(parts[p].spread, weights(row)) : 1.0;
+          scaled[p] = {parts[p].residuals, 0.0, spread * by_weight};
         }
         for (std::size_t k = 0; k < levels.size(); ++k) {
           const double width = largest_value(scaled, values_outside(levels[k], rows));
@@ -271,8 +276,9 @@ std::vector<Bounds> BoostedModel::intervals(const Eigen::Ref<const Eigen::Matrix
 }
 
 std::vector<Eigen::MatrixXd> quantiles(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                       const std::vector<double>& probabilities, int max_threads) {
-  return quantiles_from(model.intervals(inputs, levels_of_quantiles(probabilities), max_threads),
+                                       const std::vector<double>& probabilities, int max_threads,
+                                       const Eigen::VectorXd& weights) {
+  return quantiles_from(model.intervals(inputs, levels_of_quantiles(probabilities), max_threads, weights),
                         model.predict(inputs, max_threads), probabilities);
 }
 
