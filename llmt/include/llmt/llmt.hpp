@@ -12,6 +12,7 @@
 #include "llmt/bounds.hpp"
 #include "llmt/c_source.hpp"
 #include "llmt/compare.hpp"
+#include "llmt/crps.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/distributed.hpp"
 #include "llmt/explain.hpp"
