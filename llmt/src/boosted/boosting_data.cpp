@@ -88,7 +88,7 @@ std::vector<int> deal(const std::vector<int>& units, const Regime& regime, std::
   const Eigen::Index count = std::ranges::max(units) + 1;
   if (count < fewest_groups) {
     throw std::invalid_argument(
-        fmt::format("llmt::fit_boosted: there are {} groups of rows, at least {} are needed", count, fewest_groups));
+        fmt::format("llmt::fit_boosted: groups of rows: {}; at least {} are needed", count, fewest_groups));
   }
   const Eigen::Index num_parts = std::min(num_parts_of(regime, std::ssize(units)), count);
   const std::vector<Eigen::Index> order = Random(seed).permutation(count);
