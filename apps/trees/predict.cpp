@@ -145,6 +145,7 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
     for (const double p : predicted.probabilities) added.push_back(fmt::format("{}_q{}", target, p));
   }
   added.insert(added.end(), {"outside", "outside_by"});
+  if (predicted.bounds) added.emplace_back("in_gap");
   if (predicted.has_leverage) added.emplace_back("leverage");
   std::string text(csv.header_text());
   for (const std::string& column : added) {
@@ -176,6 +177,10 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
     text += extrapolation.distance > 0.0 ? '1' : '0';
     text += csv.separator();
     append_number(text, csv.decimal_mark(), extrapolation.distance);
+    if (predicted.bounds) {
+      text += csv.separator();
+      text += std::ranges::binary_search(predicted.bounds->in_gap, row) ? '1' : '0';
+    }
     if (predicted.has_leverage) {
       text += csv.separator();
       append_number(text, csv.decimal_mark(), extrapolation.leverage);
@@ -256,7 +261,8 @@ void add_predict(CLI::App& app) {
   add_output_file(*command, "-o,--output", arguments->output, "CSV file to write [standard output]");
   constexpr NumberRange level = {0.01, 0.9999, "a number from 0.01 to 0.9999"};
   add_number(*command, "--interval", arguments->interval, level,
-             "Level of prediction intervals, such as 0.9: adds TARGET_low and TARGET_high");
+             "Level of prediction intervals, such as 0.9: adds TARGET_low, TARGET_high and in_gap, 1 where a row lies "
+             "among training rows that leave its place empty");
   constexpr NumberRange probability = {0.0001, 0.9999, "numbers from 0.0001 to 0.9999, ascending"};
   add_numbers(*command, "--quantiles", arguments->quantiles, probability,
               "Probabilities such as 0.05,0.5,0.95: adds TARGET_q0.05 and so on, values below which that share of new "

@@ -41,7 +41,8 @@ def by_llmt(program, train, test, *options):
                 raise
             run(*ask)  # a program whose intervals know no weights
         out = pd.read_csv(folder / "out.csv")
-        return out["y_low"].to_numpy(), out["y_high"].to_numpy()
+        in_gap = out["in_gap"].to_numpy() if "in_gap" in out else None
+        return out["y_low"].to_numpy(), out["y_high"].to_numpy(), in_gap
 
 
 def numbers(train, test):
@@ -84,7 +85,7 @@ def by_crepes(train, test, seed=0):
     floor = 0.05 * sizes.mean()
     conformal = ConformalRegressor().fit(residuals, sigmas=(at_train + floor) / np.sqrt(w))
     ends = conformal.predict_int(predicted, sigmas=(at_test + floor) / np.sqrt(v), confidence=1 - ALPHA)
-    return ends[:, 0], ends[:, 1]
+    return ends[:, 0], ends[:, 1], None
 
 
 def forest_keys(train, test):
@@ -103,7 +104,7 @@ def fifths(key, inside):
     return [inside[rows].mean() for rows in np.array_split(np.argsort(key, kind="stable"), 5)]
 
 
-def judged(low, high, test, keys):
+def judged(low, high, in_gap, test, keys):
     y = test["y"].to_numpy()
     inside = (low <= y) & (y <= high)
     outside = np.maximum(low - y, 0) + np.maximum(y - high, 0)
@@ -114,6 +115,7 @@ def judged(low, high, test, keys):
         "of prediction": fifths(keys[0], inside),
         "of difficulty": fifths(keys[1], inside),
         "rows": len(y),
+        "in gaps": in_gap,
     }
 
 
@@ -160,7 +162,8 @@ def main():
     arguments.llmt = arguments.llmt or ["llmt"]
     methods = methods_of(arguments)
     first = next(iter(methods))
-    results, groups = defaultdict(dict), defaultdict(lambda: defaultdict(list))
+    results = defaultdict(dict)
+    groups, flagged = (defaultdict(lambda: defaultdict(list)) for _ in range(2))
     asked = arguments.made.split(";")
     tables = [(f"{name} {seed}", made(name, seed)) for name in asked for seed in range(1, arguments.seeds + 1)]
     if arguments.data:
@@ -177,21 +180,27 @@ def main():
             line = f"{method:14} coverage {found['coverage']:.3f} width {found['width']:8.4g} score {found['score']:8.4g}"
             for what in ("of prediction", "of difficulty"):
                 line += f"  {what} " + " ".join(f"{share:.2f}" for share in found[what])
+            if found["in gaps"] is not None:
+                line += f"  in gaps: {found['in gaps'].mean():.3f}"
             for what, group in of_rows.items():
                 for value in np.unique(group):
                     share = inside[np.asarray(group) == value].mean()
                     groups[method, name.rsplit(" ", 1)[0], what][value].append(share)
                     line += f"  {what} {value}: {share:.2f}"
+                    if found["in gaps"] is not None:
+                        in_gap = found["in gaps"][np.asarray(group) == value].mean()
+                        flagged[method, name.rsplit(" ", 1)[0], what][value].append(in_gap)
             print(line, flush=True)
     of_sets = [name for name, _ in tables if name.split()[0] in SETS]
     of_made = [name for name, _ in tables if name not in of_sets]
     for names in (of_made, of_sets):
         if names:
             summary(results, first, names)
-    print("\ncoverage by group, mean of the seeds")
-    for (method, name, what), of_values in groups.items():
-        means = " ".join(f"{value}: {np.mean(shares):.3f}" for value, shares in of_values.items())
-        print(f"{method:14} {name}, {what}: {means}")
+    for title, shares_of in (("coverage by group", groups), ("in gaps by group", flagged)):
+        print(f"\n{title}, mean of the seeds")
+        for (method, name, what), of_values in shares_of.items():
+            means = " ".join(f"{value}: {np.mean(shares):.3f}" for value, shares in of_values.items())
+            print(f"{method:14} {name}, {what}: {means}")
 
 
 if __name__ == "__main__":

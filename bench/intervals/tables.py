@@ -101,6 +101,21 @@ def hole(rng, rows):
     return made[0], made[1], {"in the hole": inside(asked)}
 
 
+def empty(rng, rows):
+    """No training rows in a place of two of six inputs: a band, a box or a corner, drawn."""
+    centre, half = [(0.5, 0.5), (0.55, 0.5), (0.8, 0.8)], [(0.1, 0.5), (0.15, 0.2), (0.2, 0.2)]
+    place = rng.integers(0, 3)
+
+    def inside(X):
+        return np.all(np.abs(X[:, :2] - centre[place]) < half[place], axis=1)
+
+    X = rng.uniform(size=(8 * rows, 6))
+    X = X[~inside(X)][:rows]
+    asked = rng.uniform(size=(4000, 6))
+    made = [frame(x, 2 * np.sin(5 * x[:, 0]) + 3 * x[:, 1] ** 2 + x[:, 2] + 0.3 * rng.normal(size=len(x))) for x in (X, asked)]
+    return made[0], made[1], {"in the hole": inside(asked)}
+
+
 def even(rng, rows):
     """Friedman's function with noise of 1 everywhere."""
 
@@ -187,6 +202,7 @@ MADE = {
     "rare levels": (rare_levels, 1000),
     "missing cells": (missing_cells, 1500),
     "hole": (hole, 1500),
+    "empty place": (empty, 1500),
     "even": (even, 1000),
     "of size": (of_size, 1500),
     "repeated": (repeated, 1500),

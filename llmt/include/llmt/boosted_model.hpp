@@ -12,6 +12,7 @@
 #include "llmt/abi.hpp"
 #include "llmt/boosted_sum.hpp"
 #include "llmt/bounds.hpp"
+#include "llmt/gaps.hpp"
 #include "llmt/partition.hpp"
 
 namespace llmt {
@@ -22,7 +23,7 @@ class BoostedModel {
   /// Throws std::invalid_argument naming the part that does not fit: another number of sums than outputs, an index out
   /// of range, a tree that is none, a number that is not finite, two columns of one name.
   BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<double> deviations,
-               std::vector<BoostedSum> sums);
+               std::vector<BoostedSum> sums, std::vector<Gap> gaps = {});
 
   Eigen::Index num_inputs() const { return std::ssize(inputs_); }
   Eigen::Index num_outputs() const { return std::ssize(outputs_); }
@@ -30,6 +31,7 @@ class BoostedModel {
   const std::vector<OutputColumn>& outputs() const { return outputs_; }
   const std::vector<double>& deviations() const { return deviations_; }  ///< by which inputs are divided
   const std::vector<BoostedSum>& sums() const { return sums_; }          ///< one an output
+  const std::vector<Gap>& gaps() const { return gaps_; }                 ///< of the training rows, for intervals
 
   /// Predictions, rows x outputs, for `inputs` (rows x inputs; NaN: missing). Throws std::invalid_argument if the
   /// number of columns differs or a value is infinite. Same bytes at any number of threads (0: all), and for a row
@@ -58,6 +60,7 @@ class BoostedModel {
   std::vector<OutputColumn> outputs_;
   std::vector<double> deviations_;
   std::vector<BoostedSum> sums_;
+  std::vector<Gap> gaps_;
 };
 
 /// Quantiles of each output, rows x probabilities; see quantiles_from(). Throws std::invalid_argument as

@@ -12,6 +12,7 @@
 
 #include "llmt/abi.hpp"
 #include "llmt/bounds.hpp"
+#include "llmt/gaps.hpp"
 #include "llmt/model.hpp"
 #include "llmt/spread.hpp"
 
@@ -46,6 +47,8 @@ struct HeldOutPart {
 /// two kinds of rows are therefore calibrated apart: n and S_i are those of the held-out rows of the kind of x. If
 /// there are too few of the kind for the level, the interval is that of all held-out rows, as far as needed widened to
 /// the largest residuals of the kind. If there is none of the kind, it is that of all held-out rows.
+///
+/// In a Gap of the training rows s_k(x) is the 99th percentile of all S_i over the 90th times as large.
 class Intervals {
  public:
   /// No folds; predict() throws.
@@ -53,8 +56,8 @@ class Intervals {
 
   /// Models of the folds and the parts of their held-out rows. Throws std::invalid_argument if the numbers of inputs,
   /// outputs or levels of the models differ, a part names no model or has another number of outputs or spreads, a
-  /// residual is negative or not finite, or as check_spread().
-  Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts);
+  /// residual is negative or not finite, or as check_spread() and check_gaps().
+  Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts, std::vector<Gap> gaps = {});
 
   /// One model and one matrix of absolute residuals (rows x outputs) for each fold, without spreads. `incomplete`: the
   /// same of the rows that lack an input; empty: there are none.
@@ -64,6 +67,7 @@ class Intervals {
   bool empty() const { return models_.empty(); }
   const std::vector<Model>& models() const { return models_; }
   const std::vector<HeldOutPart>& parts() const { return parts_; }  ///< in the order of their models
+  const std::vector<Gap>& gaps() const { return gaps_; }            ///< of the training rows
 
   /// Intervals that contain the fraction `level` (0.9, for example) of the outputs. Throws std::invalid_argument if
   /// there are no folds, the level is not between 0 and 1, or there are too few held-out rows of both kinds together
@@ -79,6 +83,7 @@ class Intervals {
  private:
   std::vector<Model> models_;
   std::vector<HeldOutPart> parts_;
+  std::vector<Gap> gaps_;
 };
 
 /// A model and the intervals that were made with it.

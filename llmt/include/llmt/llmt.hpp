@@ -21,6 +21,7 @@
 #include "llmt/fit.hpp"
 #include "llmt/fit_result.hpp"
 #include "llmt/folds.hpp"
+#include "llmt/gaps.hpp"
 #include "llmt/intervals.hpp"
 #include "llmt/limits.hpp"
 #include "llmt/model.hpp"

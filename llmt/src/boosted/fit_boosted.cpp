@@ -7,6 +7,7 @@
 #include "boosted/race.hpp"
 #include "llmt/boosted.hpp"
 #include "llmt/statistics.hpp"
+#include "spread/fit_gaps.hpp"
 #include "spread/fit_spread.hpp"
 
 namespace llmt {
@@ -209,6 +210,19 @@ Spread with_columns(const Spread& spread, const std::vector<int>& columns) {
   return moved;
 }
 
+// The gaps of all rows in all numbers, where the caller has them.
+std::vector<Gap> gaps_of(const BoostingData& data) {
+  std::vector<int> columns;
+  for (int j = 0; j < std::ssize(data.inputs); ++j) {
+    if (!data.inputs[j].is_categorical()) columns.push_back(j);
+  }
+  std::vector<Gap> gaps = fit_gaps(data.x, columns);
+  for (Gap& gap : gaps) {
+    for (GapSide& side : gap.sides) side.column = data.columns[side.column];
+  }
+  return gaps;
+}
+
 // The model with its inputs where the caller has them.
 BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
   std::vector<InputColumn> inputs(data.inputs.size());
@@ -224,7 +238,7 @@ BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
     }
     for (SumResiduals& part : sum.held_out) part.spread = with_columns(part.spread, data.columns);
   }
-  return {std::move(inputs), data.outputs, std::move(deviations), std::move(sums)};
+  return {std::move(inputs), data.outputs, std::move(deviations), std::move(sums), gaps_of(data)};
 }
 
 }  // namespace

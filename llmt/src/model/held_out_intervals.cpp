@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "model/incomplete.hpp"
+#include "spread/fit_gaps.hpp"
 #include "spread/fit_spread.hpp"
 
 namespace llmt {
@@ -77,6 +78,18 @@ std::vector<std::vector<Spread>> divide_by_spreads(const std::vector<InputColumn
   return spreads;
 }
 
+// The gaps of all rows in the numbers that the models use.
+std::vector<Gap> gaps_of(const std::vector<Model>& models, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  std::vector<int> columns;
+  std::vector<std::vector<bool>> used;
+  for (const Model& model : models) used.push_back(used_inputs(model));
+  for (std::size_t j = 0; j < models.front().inputs().size(); ++j) {
+    const bool is_used = std::ranges::any_of(used, [&](const std::vector<bool>& of_model) { return of_model[j]; });
+    if (is_used && !models.front().inputs()[j].is_categorical()) columns.push_back(static_cast<int>(j));
+  }
+  return fit_gaps(inputs, columns);
+}
+
 }  // namespace
 
 Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
@@ -115,7 +128,8 @@ Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const E
       part.disagreement.push_back(usual_size(differences.col(o)(whole)));
     }
   }
-  return {std::move(models), std::move(parts)};
+  std::vector<Gap> gaps = gaps_of(models, inputs);
+  return {std::move(models), std::move(parts), std::move(gaps)};
 }
 
 }  // namespace llmt

@@ -20,6 +20,30 @@ Json json_of(const Spread& spread) {
   return json;
 }
 
+Json json_of(const std::vector<Gap>& gaps) {
+  Json json = Json::array();
+  for (const Gap& gap : gaps) {
+    Json sides = Json::array();
+    for (const GapSide& side : gap.sides) sides.push_back({side.column, side.low, side.high});
+    json.push_back(std::move(sides));
+  }
+  return json;
+}
+
+std::vector<Gap> gaps_from(const JsonReader& model) {
+  std::vector<Gap> gaps;
+  if (!model.has("gaps")) return gaps;
+  for (const JsonReader& entry : model.member("gaps").elements()) {
+    Gap& gap = gaps.emplace_back();
+    for (const JsonReader& side : entry.elements()) {
+      const std::vector<JsonReader> parts = side.elements();
+      if (parts.size() != 3) side.fail("a side of a gap has 3 numbers: a column, and the ends");
+      gap.sides.push_back({parts[0].as<int>(), parts[1].as<double>(), parts[2].as<double>()});
+    }
+  }
+  return gaps;
+}
+
 Spread spread_from(const JsonReader& json) {
   Spread spread;
   for (const JsonReader& entry : json.member("nodes").elements()) {

@@ -154,12 +154,14 @@ double value_of(const BoostedTree& tree, const double* z) {
 }
 
 BoostedModel::BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
-                           std::vector<double> deviations, std::vector<BoostedSum> sums)
+                           std::vector<double> deviations, std::vector<BoostedSum> sums, std::vector<Gap> gaps)
     : inputs_(std::move(inputs)),
       outputs_(std::move(outputs)),
       deviations_(std::move(deviations)),
-      sums_(std::move(sums)) {
+      sums_(std::move(sums)),
+      gaps_(std::move(gaps)) {
   check_boosted(inputs_, outputs_, deviations_, sums_);
+  check_gaps(gaps_, num_inputs());
 }
 
 BoostedSize size_of(const BoostedModel& model) {
@@ -248,21 +250,26 @@ std::vector<Bounds> BoostedModel::intervals(const Eigen::Ref<const Eigen::Matrix
   check_row_weights("llmt::BoostedModel::intervals", weights, inputs.rows());
   const Eigen::MatrixXd predicted = predict(inputs, max_threads);
   const Eigen::MatrixXd at = with_empty_levels(inputs_, inputs);
-  std::vector<Bounds> bounds(levels.size(), Bounds{predicted, predicted});
+  const std::vector<Eigen::Index> in_gap = rows_in_gaps(gaps_, inputs);
+  std::vector<Bounds> bounds(levels.size(), Bounds{.lower = predicted, .upper = predicted, .in_gap = in_gap});
   for (Eigen::Index o = 0; o < num_outputs(); ++o) {
     const std::vector<SumResiduals>& parts = sums_[o].held_out;
     Eigen::Index rows = 0;
     for (const SumResiduals& part : parts) rows += std::ssize(part.residuals);
     for (const double level : levels) check_level("llmt::BoostedModel::intervals", level, rows);
+    std::vector<ScaledResiduals> residuals;
+    for (const SumResiduals& part : parts) residuals.push_back({part.residuals});
+    const double factor = factor_in_gaps(residuals);
     const RowBlocks blocks{inputs.rows(), rows_at_once};
     parallel_for(blocks.count(), max_threads, [&](Eigen::Index block) {
       const auto [begin, end] = blocks[block];
       std::vector<ScaledResiduals> scaled(parts.size());
       for (Eigen::Index row = begin; row < end; ++row) {
+        const double in_gaps = std::ranges::binary_search(in_gap, row) ? factor : 1.0;
         for (std::size_t p = 0; p < parts.size(); ++p) {
           const double spread = spread_at(parts[p].spread, at, row, predicted(row, o));
           const double by_weight = weights.size() > 0 ? factor_of_weight(parts[p].spread, weights(row)) : 1.0;
-          scaled[p] = {parts[p].residuals, 0.0, spread * by_weight};
+          scaled[p] = {parts[p].residuals, 0.0, spread * by_weight * in_gaps};
         }
         for (std::size_t k = 0; k < levels.size(); ++k) {
           const double width = largest_value(scaled, values_outside(levels[k], rows));
