@@ -37,7 +37,7 @@ TEST(LlmtProgram, IntervalsHoldTheirLevelOnFreshRows) {
   ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
   const llmt::Csv result = llmt::Csv::read(folder.file("p.csv"));
   EXPECT_EQ(result.columns(), (std::vector<std::string>{"a", "b", "y", "y_pred", "y_low", "y_high", "outside",
-                                                        "outside_by", "leverage"}));
+                                                        "outside_by", "in_gap", "leverage"}));
   const Eigen::ArrayXd y = result.numbers("y");
   const Eigen::ArrayXd low = result.numbers("y_low");
   const Eigen::ArrayXd high = result.numbers("y_high");
