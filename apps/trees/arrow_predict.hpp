@@ -17,6 +17,7 @@ struct PredictArguments {
   bool json = false;
   double interval = 0.0;          ///< level; 0: none
   std::vector<double> quantiles;  ///< probabilities
+  std::string weight;             ///< column; empty: none
   DecimalMark mark = DecimalMark::point;
   bool thousands = false;
   int threads = 0;

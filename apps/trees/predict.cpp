@@ -60,38 +60,54 @@ bool asks_for_intervals(const PredictArguments& arguments) {
 
 // The intervals and quantiles that are asked for.
 void add_intervals(const PredictArguments& arguments, const BoostedModel& model, const Eigen::MatrixXd& inputs,
-                   report::Prediction& predicted) {
+                   const Eigen::VectorXd& weights, report::Prediction& predicted) {
   if (!model.has_intervals()) {
     throw std::runtime_error(fmt::format("{}: the file has no held-out residuals; fit again", arguments.model));
   }
-  if (arguments.interval > 0.0) predicted.bounds = model.intervals(inputs, arguments.interval, arguments.threads);
+  if (arguments.interval > 0.0) {
+    predicted.bounds = model.intervals(inputs, arguments.interval, arguments.threads, weights);
+  }
   if (!arguments.quantiles.empty()) {
-    predicted.quantiles = quantiles(model, inputs, arguments.quantiles, arguments.threads);
+    predicted.quantiles = quantiles(model, inputs, arguments.quantiles, arguments.threads, weights);
   }
 }
 
 void add_intervals(const PredictArguments& arguments, const ModelWithIntervals& file, const Eigen::MatrixXd& inputs,
-                   report::Prediction& predicted) {
+                   const Eigen::VectorXd& weights, report::Prediction& predicted) {
   if (file.intervals.empty()) {
     throw std::runtime_error(fmt::format(
         "{}: the file has no held-out residuals; fit without --no-intervals and with folds", arguments.model));
   }
   if (arguments.interval > 0.0) {
-    predicted.bounds = holding(file.intervals.predict(inputs, arguments.interval, arguments.threads), predicted.values);
+    predicted.bounds =
+        holding(file.intervals.predict(inputs, arguments.interval, arguments.threads, weights), predicted.values);
   }
   if (!arguments.quantiles.empty()) {
-    predicted.quantiles = quantiles(file, inputs, arguments.quantiles, arguments.threads);
+    predicted.quantiles = quantiles(file, inputs, arguments.quantiles, arguments.threads, weights);
   }
+}
+
+// The weights of the rows; empty: none are asked for.
+Eigen::VectorXd weights_of(const PredictArguments& arguments, const Csv& csv) {
+  if (arguments.weight.empty()) return {};
+  const Eigen::VectorXd weights = csv.numbers(arguments.weight, arguments.threads);
+  for (Eigen::Index row = 0; row < weights.size(); ++row) {
+    if (weights(row) > 0.0) continue;
+    throw std::runtime_error(fmt::format("{}:{}: column \"{}\": a weight is positive, this one is {}", csv.name(),
+                                         csv.line_of(row), arguments.weight, weights(row)));
+  }
+  return weights;
 }
 
 // What cannot be had is the file's fault, not the caller's: it has too few residuals for the level.
 template <class AnyModel>
-void add_asked_intervals(const PredictArguments& arguments, const AnyModel& model, const Eigen::MatrixXd& inputs,
-                         report::Prediction& predicted) {
+void add_asked_intervals(const PredictArguments& arguments, const AnyModel& model, const Csv& csv,
+                         const Eigen::MatrixXd& inputs, report::Prediction& predicted) {
   if (!asks_for_intervals(arguments)) return;
+  const Eigen::VectorXd weights = weights_of(arguments, csv);
   predicted.probabilities = arguments.quantiles;
   try {
-    add_intervals(arguments, model, inputs, predicted);
+    add_intervals(arguments, model, inputs, weights, predicted);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
   }
@@ -102,7 +118,7 @@ report::Prediction predict_table(const PredictArguments& arguments, const Booste
   report::Prediction predicted = predict_values(arguments, model, inputs);
   predicted.has_leverage = false;
   for (const double distance : distance_outside(model, inputs.values)) predicted.extrapolation.push_back({distance});
-  add_asked_intervals(arguments, model, inputs.values, predicted);
+  add_asked_intervals(arguments, model, csv, inputs.values, predicted);
   if (predicted.bounds) predicted.bounds->uncalibrated = incomplete_rows(model, inputs.values);
   add_errors(arguments, csv, predicted);
   return predicted;
@@ -113,7 +129,7 @@ report::Prediction predict_table(const PredictArguments& arguments, const ModelW
   const report::ModelInputs inputs = report::read_inputs(csv, model, arguments.threads);
   report::Prediction predicted = predict_values(arguments, model, inputs);
   predicted.extrapolation = model.extrapolation(inputs.values, arguments.threads);
-  add_asked_intervals(arguments, file, inputs.values, predicted);
+  add_asked_intervals(arguments, file, csv, inputs.values, predicted);
   add_errors(arguments, csv, predicted);
   return predicted;
 }
@@ -129,6 +145,7 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
     for (const double p : predicted.probabilities) added.push_back(fmt::format("{}_q{}", target, p));
   }
   added.insert(added.end(), {"outside", "outside_by"});
+  if (predicted.bounds) added.emplace_back("in_gap");
   if (predicted.has_leverage) added.emplace_back("leverage");
   std::string text(csv.header_text());
   for (const std::string& column : added) {
@@ -160,6 +177,10 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
     text += extrapolation.distance > 0.0 ? '1' : '0';
     text += csv.separator();
     append_number(text, csv.decimal_mark(), extrapolation.distance);
+    if (predicted.bounds) {
+      text += csv.separator();
+      text += std::ranges::binary_search(predicted.bounds->in_gap, row) ? '1' : '0';
+    }
     if (predicted.has_leverage) {
       text += csv.separator();
       append_number(text, csv.decimal_mark(), extrapolation.leverage);
@@ -192,6 +213,9 @@ report::Prediction predict_file(const PredictArguments& arguments, std::optional
 
 void predict_command(const PredictArguments& arguments) {
   levels_of_quantiles(arguments.quantiles);  // throws if they do not ascend
+  if (!arguments.weight.empty() && !asks_for_intervals(arguments)) {
+    throw std::invalid_argument("--weight says how wide intervals are; give --interval or --quantiles too");
+  }
   if (is_arrow_file(arguments.data) || !arguments.more.empty()) {
     predict_files(arguments);
     return;
@@ -237,11 +261,17 @@ void add_predict(CLI::App& app) {
   add_output_file(*command, "-o,--output", arguments->output, "CSV file to write [standard output]");
   constexpr NumberRange level = {0.01, 0.9999, "a number from 0.01 to 0.9999"};
   add_number(*command, "--interval", arguments->interval, level,
-             "Level of prediction intervals, such as 0.9: adds TARGET_low and TARGET_high");
+             "Level of prediction intervals, such as 0.9: adds TARGET_low, TARGET_high and in_gap, 1 where a row lies "
+             "among training rows that leave its place empty");
   constexpr NumberRange probability = {0.0001, 0.9999, "numbers from 0.0001 to 0.9999, ascending"};
   add_numbers(*command, "--quantiles", arguments->quantiles, probability,
               "Probabilities such as 0.05,0.5,0.95: adds TARGET_q0.05 and so on, values below which that share of new "
               "rows lies");
+  command
+      ->add_option("--weight", arguments->weight,
+                   "The rows' weights, for --interval and --quantiles of a model that was fitted with --weight [the "
+                   "median weight of the fit]")
+      ->type_name("COLUMN");
   add_decimal_comma(*command, arguments->mark);
   add_thousands(*command, arguments->thousands);
   add_threads(*command, arguments->threads);

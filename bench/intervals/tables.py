@@ -1,4 +1,7 @@
-"""Tables for intervals: public sets, and made ones whose noise is known. Each is (train, test, groups of test rows)."""
+"""Tables for intervals: public sets, and made ones whose noise is known. Each is (train, test, groups of test rows).
+
+A column "weight" holds the weights of the rows, and no input.
+"""
 
 import numpy as np
 import pandas as pd
@@ -98,6 +101,21 @@ def hole(rng, rows):
     return made[0], made[1], {"in the hole": inside(asked)}
 
 
+def empty(rng, rows):
+    """No training rows in a place of two of six inputs: a band, a box or a corner, drawn."""
+    centre, half = [(0.5, 0.5), (0.55, 0.5), (0.8, 0.8)], [(0.1, 0.5), (0.15, 0.2), (0.2, 0.2)]
+    place = rng.integers(0, 3)
+
+    def inside(X):
+        return np.all(np.abs(X[:, :2] - centre[place]) < half[place], axis=1)
+
+    X = rng.uniform(size=(8 * rows, 6))
+    X = X[~inside(X)][:rows]
+    asked = rng.uniform(size=(4000, 6))
+    made = [frame(x, 2 * np.sin(5 * x[:, 0]) + 3 * x[:, 1] ** 2 + x[:, 2] + 0.3 * rng.normal(size=len(x))) for x in (X, asked)]
+    return made[0], made[1], {"in the hole": inside(asked)}
+
+
 def even(rng, rows):
     """Friedman's function with noise of 1 everywhere."""
 
@@ -130,21 +148,78 @@ def repeated(rng, rows):
     return train, test, {"fifth of noise": np.minimum(5 * test["x3"], 4).astype(int)}
 
 
+def weighted(rng, rows):
+    """Noise of the variance 1 / weight, weights from 1/16 to 16."""
+
+    def made(n):
+        X, weight = rng.uniform(size=(n, 4)), 16.0 ** rng.uniform(-1, 1, n)
+        table = frame(X, 5 * X[:, 0] + 2 * np.sin(6 * X[:, 1]) + 0.5 * rng.normal(size=n) / np.sqrt(weight))
+        table["weight"] = weight
+        return table
+
+    train, test = made(rows), made(4000)
+    return train, test, {"fifth of weight": fifth(test["weight"])}
+
+
+def important(rng, rows):
+    """The same weights, which say how much rows matter: noise of 0.5 everywhere."""
+
+    def made(n):
+        X = rng.uniform(size=(n, 4))
+        table = frame(X, 5 * X[:, 0] + 2 * np.sin(6 * X[:, 1]) + 0.5 * rng.normal(size=n))
+        table["weight"] = 16.0 ** rng.uniform(-1, 1, n)
+        return table
+
+    train, test = made(rows), made(4000)
+    return train, test, {"fifth of weight": fifth(test["weight"])}
+
+
+def in_time(rng, rows):
+    """Rows in time: inputs and noise are AR(1) with 0.9 and 0.8. Test rows are of another stretch."""
+
+    def steps(n, memory):
+        values = np.empty(n)
+        values[0] = rng.normal()
+        for t in range(1, n):
+            values[t] = memory * values[t - 1] + np.sqrt(1 - memory**2) * rng.normal()
+        return values
+
+    def made(n):
+        X = np.column_stack([steps(n, 0.9) for _ in range(3)])
+        return frame(X, 2 * X[:, 0] + np.sin(2 * X[:, 1]) + 0.5 * steps(n, 0.8))
+
+    return made(rows), made(4000), {}
+
+
+def fifth(values):
+    return np.argsort(np.argsort(values, kind="stable"), kind="stable") * 5 // len(values)
+
+
+# The maker, the number of rows, and what `llmt fit` is told of them.
 MADE = {
     "noise changes": (noise_changes, 2000),
     "loud levels": (loud_levels, 2000),
     "rare levels": (rare_levels, 1000),
     "missing cells": (missing_cells, 1500),
     "hole": (hole, 1500),
+    "empty place": (empty, 1500),
     "even": (even, 1000),
     "of size": (of_size, 1500),
     "repeated": (repeated, 1500),
     "even, 30 rows": (even, 30),
     "even, 60 rows": (even, 60),
     "noise changes, 150 rows": (noise_changes, 150),
+    "weighted": (weighted, 2000),
+    "weighted, 60 rows": (weighted, 60),
+    "important": (important, 2000),
+    "in time": (in_time, 1500, "--contiguous"),
 }
 
 
+def options_of(name):
+    return MADE[name][2:] if name in MADE else ()
+
+
 def made(name, seed):
-    maker, rows = MADE[name]
+    maker, rows = MADE[name][:2]
     return maker(np.random.default_rng([seed, len(name)]), rows)

@@ -94,6 +94,21 @@ TEST(Groups, OfRepeatsAreSaidWithWhatRepeatsDifferBy) {
   EXPECT_EQ(errors["rows_known"], 0);
 }
 
+TEST(Groups, OfWhichThereIsOneLeaveNothingToHoldOut) {
+  const Folder folder;
+  std::string text = "a,g,y\n";
+  for (int i = 0; i < 60; ++i) text += fmt::format("{},{},{}\n", i % 7, 1, i % 7 + i % 3);
+  folder.write("d.csv", text);
+  const Outcome outcome = folder.run(llmt_program + " fit d.csv -t y --groups g");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("no held-out rows, because all rows are of one group"), std::string::npos) << outcome.out;
+  const Outcome without = folder.run(llmt_program + " fit d.csv -t y --cv 0");
+  EXPECT_EQ(without.out.find("of one group"), std::string::npos) << without.out;
+  const Outcome sum = folder.run(llmt_program + " fit d.csv -t y --groups g --boost");
+  EXPECT_NE(sum.exit_code, 0);
+  EXPECT_NE(sum.err.find("groups of rows: 1; at least 5 are needed"), std::string::npos) << sum.err;
+}
+
 // What nobody measured drifts slowly, and an input of time follows it.
 std::string drifting(bool in_order) {
   llmt::Random random(3);

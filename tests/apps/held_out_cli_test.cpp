@@ -37,7 +37,7 @@ TEST(LlmtProgram, IntervalsHoldTheirLevelOnFreshRows) {
   ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
   const llmt::Csv result = llmt::Csv::read(folder.file("p.csv"));
   EXPECT_EQ(result.columns(), (std::vector<std::string>{"a", "b", "y", "y_pred", "y_low", "y_high", "outside",
-                                                        "outside_by", "leverage"}));
+                                                        "outside_by", "in_gap", "leverage"}));
   const Eigen::ArrayXd y = result.numbers("y");
   const Eigen::ArrayXd low = result.numbers("y_low");
   const Eigen::ArrayXd high = result.numbers("y_high");
@@ -86,6 +86,43 @@ TEST(LlmtProgram, QuantilesDoNotCross) {
       json::parse(folder.run(llmt_program + " predict m.json fresh.csv --quantiles 0.1,0.5 --json").out);
   EXPECT_EQ(values["targets"][0]["quantiles"][0]["probability"], 0.1);
   EXPECT_EQ(values["targets"][0]["quantiles"][1]["values"], values["targets"][0]["predicted"]);
+}
+
+// y = x + noise of the variance 1 / w.
+std::string with_weights(int rows, std::uint64_t seed) {
+  llmt::Random random(seed);
+  std::string text = "x,w,y\n";
+  for (int i = 0; i < rows; ++i) {
+    const double x = random.uniform();
+    const double weight = i % 2 == 0 ? 0.2 : 5.5;
+    text += fmt::format("{},{},{}\n", x, weight, x + random.normal() / std::sqrt(weight));
+  }
+  return text;
+}
+
+TEST(LlmtProgram, IntervalsFollowTheWeightsOfNewRows) {
+  const Folder folder;
+  folder.write("d.csv", with_weights(600, 1));
+  folder.write("fresh.csv", with_weights(2000, 2));
+  folder.write("bad.csv", "x,w\n0.5,1\n0.5,0\n");
+  for (const char* kind : {"", " --boost"}) {
+    ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y --weight w -o m.json" + kind).exit_code, 0);
+    const Outcome predicted =
+        folder.run(llmt_program + " predict m.json fresh.csv --weight w --interval 0.9 --quantiles 0.05 -o p.csv");
+    ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
+    const llmt::Csv result = llmt::Csv::read(folder.file("p.csv"));
+    EXPECT_EQ(result.numbers("y_q0.05"), result.numbers("y_low"));
+    const Eigen::ArrayXd widths = result.numbers("y_high") - result.numbers("y_low");
+    EXPECT_NEAR(widths(0), 3.29 / std::sqrt(0.2), 1.2) << kind;
+    EXPECT_NEAR(widths(1), 3.29 / std::sqrt(5.5), 0.4) << kind;
+    const Outcome bad = folder.run(llmt_program + " predict m.json bad.csv --weight w --interval 0.9");
+    EXPECT_EQ(bad.exit_code, 1);
+    EXPECT_NE(bad.err.find("bad.csv:3: column \"w\": a weight is positive, this one is 0"), std::string::npos)
+        << bad.err;
+  }
+  const Outcome alone = folder.run(llmt_program + " predict m.json fresh.csv --weight w");
+  EXPECT_EQ(alone.exit_code, 2);
+  EXPECT_NE(alone.err.find("give --interval or --quantiles too"), std::string::npos) << alone.err;
 }
 
 TEST(LlmtProgram, NoIntervalsWithoutHeldOutResiduals) {
@@ -149,6 +186,13 @@ TEST(LlmtProgram, CompareListsTheMethodsAndRecommendsOne) {
     names.push_back(method["method"]);
     errors[names.back()] = method["cv_rmse"];
     EXPECT_EQ(method["fold_rmse"].size(), 3U) << names.back();
+    if (method["method"] == "least squares" || method["method"] == "M5', smoothed") {
+      EXPECT_TRUE(method["crps"].is_null() && method["coverage_90"].is_null()) << names.back();
+    } else {
+      EXPECT_NEAR(method["coverage_90"].get<double>(), 0.9, 0.1) << names.back();
+      EXPECT_GT(method["crps"].get<double>(), 0.3 * errors[names.back()]) << names.back();  // 0.56 of normal errors
+      EXPECT_LT(method["crps"].get<double>(), errors[names.back()]) << names.back();
+    }
     if (names.back() == "sum of trees") continue;  // its leaves have a constant and slopes of their path; jumps add up
     EXPECT_GE(method["parameters"], 3 * method["leaves"].get<int>()) << names.back();
     EXPECT_GE(method["largest_jump"], 0.0) << names.back();

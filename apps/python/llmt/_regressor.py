@@ -81,6 +81,9 @@ class TableRegressor(RegressorMixin, BaseEstimator):
     def predict_interval(self, X: Any, coverage: float = 0.9) -> np.ndarray:
         """Intervals that hold the share `coverage` of the targets (docs/algorithms/intervals.md).
 
+        They are wider for rows in a gap of the training rows: within the range of every input, but far from all of
+        them. After a fit with sample weights that are no counts they are those of rows of the median weight.
+
         Returns
         -------
         ndarray, (rows, 2), or (rows, 2, targets) where y had two dimensions

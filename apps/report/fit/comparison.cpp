@@ -18,6 +18,8 @@ Json comparison_json(const FitRun& run, const std::string& target, const Compari
                                {"cv_rmse", method.cv_rmse},
                                {"spread", method.spread},
                                {"fold_rmse", std::vector<double>(method.fold_rmse.begin(), method.fold_rmse.end())},
+                               {"coverage_90", finite_or_null(method.coverage)},
+                               {"crps", finite_or_null(method.crps)},
                                {"largest_jump", finite_or_null(method.largest_jump)},
                                {"fit_seconds", method.fit_seconds},
                                {"predict_seconds_per_million_rows", method.predict_seconds}});

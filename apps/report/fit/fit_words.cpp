@@ -24,7 +24,11 @@ std::string title_with_default(GrowthRule rule) {
 
 // How the held-out rows came to be.
 std::string selection_text(const FitRun& run, const PartitionSummary& partition) {
-  if (partition.cv_folds == 0) return "no held-out rows: the tree stays as grown";
+  if (partition.cv_folds == 0) {
+    const bool is_one_group = run.options.folds.count > 0 && !run.rows.groups.empty();
+    return fmt::format("no held-out rows{}: the tree stays as grown",
+                       is_one_group ? ", because all rows are of one group" : "");
+  }
   if (partition.cv_folds == 1) {
     return fmt::format("chosen on {} rows held out once", partition.held_out_rows);
   }

@@ -73,14 +73,16 @@ Chart folds_chart(const Compared& of) {
 }
 
 Json methods_table(const Compared& of) {
-  Grid grid{.header = {"method", "leaves", "parameters", "RMSE held-out", "spread of folds", "largest jump", "fit, s",
-                       "predict 1e6 rows, s"},
+  Grid grid{.header = {"method", "leaves", "parameters", "RMSE held-out", "spread of folds", "in 90 %", "CRPS",
+                       "largest jump", "fit, s", "predict 1e6 rows, s"},
             .rows = {},
             .marked = static_cast<int>(of.result.recommended),
             .wide = true};
   for (const Comparison& method : of.result.methods) {
     grid.rows.push_back({method.method, std::to_string(method.leaves), std::to_string(method.parameters),
                          number(method.cv_rmse), number(method.spread, 2),
+                         std::isnan(method.coverage) ? "-" : fmt::format("{:.1f} %", 100.0 * method.coverage),
+                         std::isnan(method.crps) ? "-" : number(method.crps),
                          std::isnan(method.largest_jump) ? "-" : number(method.largest_jump, 3),
                          number(method.fit_seconds, 2), number(method.predict_seconds, 2)});
   }

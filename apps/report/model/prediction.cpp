@@ -45,6 +45,10 @@ Json prediction_json(const Prediction& prediction, bool with_values) {
   if (prediction.unseen_codes > 0) json["unseen_codes"] = prediction.unseen_codes;
   if (const Eigen::Index count = count_not_finite(prediction); count > 0) json["not_finite_predictions"] = count;
   if (const std::size_t count = count_uncalibrated(prediction); count > 0) json["uncalibrated_intervals"] = count;
+  if (prediction.bounds && !prediction.bounds->in_gap.empty()) {
+    json["rows_in_gaps"] = Json::array();
+    for (const Eigen::Index row : prediction.bounds->in_gap) json["rows_in_gaps"].push_back(row + 1);
+  }
   json["targets"] = Json::array();
   for (std::size_t o = 0; o < prediction.targets.size(); ++o) {
     const Eigen::Index column = o;
@@ -97,6 +101,12 @@ std::string prediction_text(const Prediction& prediction, const std::string& dat
   }
   if (prediction.unseen_codes > 0) {
     text += fmt::format("; {} codes that were not in training, taken as the nearest", prediction.unseen_codes);
+  }
+  if (const std::size_t count = prediction.bounds ? prediction.bounds->in_gap.size() : 0; count > 0) {
+    text += fmt::format(
+        "; {} row{} in a gap of the training rows, within their range but far from all of them (in_gap): the "
+        "interval{} therefore wider",
+        count, count == 1 ? " lies" : "s lie", count == 1 ? " is" : "s are");
   }
   if (const std::size_t count = count_uncalibrated(prediction); count > 0) {
     text += fmt::format(

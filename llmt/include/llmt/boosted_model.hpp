@@ -12,6 +12,7 @@
 #include "llmt/abi.hpp"
 #include "llmt/boosted_sum.hpp"
 #include "llmt/bounds.hpp"
+#include "llmt/gaps.hpp"
 #include "llmt/partition.hpp"
 
 namespace llmt {
@@ -22,7 +23,7 @@ class BoostedModel {
   /// Throws std::invalid_argument naming the part that does not fit: another number of sums than outputs, an index out
   /// of range, a tree that is none, a number that is not finite, two columns of one name.
   BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<double> deviations,
-               std::vector<BoostedSum> sums);
+               std::vector<BoostedSum> sums, std::vector<Gap> gaps = {});
 
   Eigen::Index num_inputs() const { return std::ssize(inputs_); }
   Eigen::Index num_outputs() const { return std::ssize(outputs_); }
@@ -30,6 +31,7 @@ class BoostedModel {
   const std::vector<OutputColumn>& outputs() const { return outputs_; }
   const std::vector<double>& deviations() const { return deviations_; }  ///< by which inputs are divided
   const std::vector<BoostedSum>& sums() const { return sums_; }          ///< one an output
+  const std::vector<Gap>& gaps() const { return gaps_; }                 ///< of the training rows, for intervals
 
   /// Predictions, rows x outputs, for `inputs` (rows x inputs; NaN: missing). Throws std::invalid_argument if the
   /// number of columns differs or a value is infinite. Same bytes at any number of threads (0: all), and for a row
@@ -44,24 +46,28 @@ class BoostedModel {
   ///   lower, upper = f(x) -+ the floor((1 - level) (n + 1))-th largest of s_p(i)(x) S_i,
   /// as in normalised split conformal prediction (Lei et al. 2018). They are about right: the trees of all rows are a
   /// little better than those of the residuals, whose rows decided where these stopped. Throws std::invalid_argument if
-  /// there are no residuals, too few for the level, or if the level is not between 0 and 1, and as predict().
-  Bounds intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0) const;
+  /// there are no residuals, too few for the level, or if the level is not between 0 and 1, and as predict() and
+  /// check_row_weights(). `weights`: as of Intervals::predict().
+  Bounds intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0,
+                   const Eigen::VectorXd& weights = {}) const;
 
   /// The same for several levels.
   std::vector<Bounds> intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<double>& levels,
-                                int max_threads = 0) const;
+                                int max_threads = 0, const Eigen::VectorXd& weights = {}) const;
 
  private:
   std::vector<InputColumn> inputs_;
   std::vector<OutputColumn> outputs_;
   std::vector<double> deviations_;
   std::vector<BoostedSum> sums_;
+  std::vector<Gap> gaps_;
 };
 
 /// Quantiles of each output, rows x probabilities; see quantiles_from(). Throws std::invalid_argument as
 /// levels_of_quantiles() and BoostedModel::intervals().
 std::vector<Eigen::MatrixXd> quantiles(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                       const std::vector<double>& probabilities, int max_threads = 0);
+                                       const std::vector<double>& probabilities, int max_threads = 0,
+                                       const Eigen::VectorXd& weights = {});
 
 /// How large a model is, over all outputs.
 struct BoostedSize {

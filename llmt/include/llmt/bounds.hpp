@@ -16,6 +16,8 @@ struct Bounds {
   /// Rows that lack an input for which there were too few held-out rows like them for the level. Their intervals are
   /// likely too narrow, see Intervals.
   std::vector<Eigen::Index> uncalibrated = {};
+  /// Rows that lie in a Gap of the training rows. Their intervals are wider than their errors alone would make them.
+  std::vector<Eigen::Index> in_gap = {};
 };
 
 /// The bounds, widened where needed so that they hold the predictions of the model. Folds' models may all lie on one

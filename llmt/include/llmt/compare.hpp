@@ -51,12 +51,20 @@ struct Comparison {
   Eigen::VectorXd fold_rmse = {};  ///< held-out, one entry a fold
   double cv_rmse = 0.0;            ///< over all held-out rows
   double spread = 0.0;             ///< standard deviation of fold_rmse
+  /// Of all held-out rows, the share that lies within its 90 % prediction interval, and the mean of crps() over 20
+  /// quantiles; weighted as the error. NaN where a fold leaves fewer than `fewest_rows_of_crps` rows to hold out
+  /// within.
+  double coverage = 0.0;
+  double crps = 0.0;
   /// Largest change of the prediction across a split, at the training rows' projections on it (at most 1000 rows). NaN
   /// of a sum of trees.
   double largest_jump = 0.0;
   double fit_seconds = 0.0;      ///< of the model of all rows, its own selection included
   double predict_seconds = 0.0;  ///< time to predict a million rows
 };
+
+/// Held-out rows that the outermost of 20 quantiles, 0.025 and 0.975, need.
+inline constexpr Eigen::Index fewest_rows_of_crps = 19;
 
 struct ComparisonResult {
   std::vector<Comparison> methods;  ///< in the order asked for

@@ -12,6 +12,7 @@
 
 #include "llmt/abi.hpp"
 #include "llmt/bounds.hpp"
+#include "llmt/gaps.hpp"
 #include "llmt/model.hpp"
 #include "llmt/spread.hpp"
 
@@ -36,12 +37,18 @@ struct HeldOutPart {
 /// So the width follows the size of the errors near x. The guarantee is a coverage of 1 - 2 a for exchangeable rows; in
 /// practice it is near 1 - a, the level that is asked for. A single fold is dealt to five parts, which share its model:
 /// the spread of a part is learnt from the others. This is split conformal prediction. Below 100 held-out rows the
-/// spread is 1. Weights of rows are not used.
+/// spread does not depend on x.
+///
+/// Weights of the training rows that are no counts say how well a row is known, so that a new row has a weight of its
+/// own: sigma(x, w) of Spread. Without weights of the new rows the intervals are those of rows of the median weight of
+/// the held-out rows.
 ///
 /// Rows that lack an input which the models use (an empty cell, an unknown category) err more than complete rows. The
 /// two kinds of rows are therefore calibrated apart: n and S_i are those of the held-out rows of the kind of x. If
 /// there are too few of the kind for the level, the interval is that of all held-out rows, as far as needed widened to
 /// the largest residuals of the kind. If there is none of the kind, it is that of all held-out rows.
+///
+/// In a Gap of the training rows s_k(x) is the 99th percentile of all S_i over the 90th times as large.
 class Intervals {
  public:
   /// No folds; predict() throws.
@@ -49,8 +56,8 @@ class Intervals {
 
   /// Models of the folds and the parts of their held-out rows. Throws std::invalid_argument if the numbers of inputs,
   /// outputs or levels of the models differ, a part names no model or has another number of outputs or spreads, a
-  /// residual is negative or not finite, or as check_spread().
-  Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts);
+  /// residual is negative or not finite, or as check_spread() and check_gaps().
+  Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts, std::vector<Gap> gaps = {});
 
   /// One model and one matrix of absolute residuals (rows x outputs) for each fold, without spreads. `incomplete`: the
   /// same of the rows that lack an input; empty: there are none.
@@ -60,19 +67,23 @@ class Intervals {
   bool empty() const { return models_.empty(); }
   const std::vector<Model>& models() const { return models_; }
   const std::vector<HeldOutPart>& parts() const { return parts_; }  ///< in the order of their models
+  const std::vector<Gap>& gaps() const { return gaps_; }            ///< of the training rows
 
   /// Intervals that contain the fraction `level` (0.9, for example) of the outputs. Throws std::invalid_argument if
   /// there are no folds, the level is not between 0 and 1, or there are too few held-out rows of both kinds together
-  /// for it, and as Model::predict().
-  Bounds predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0) const;
+  /// for it, and as Model::predict(). `weights`: of the rows, in the unit of those in training; empty: the median one.
+  /// Throws std::invalid_argument as check_row_weights().
+  Bounds predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0,
+                 const Eigen::VectorXd& weights = {}) const;
 
   /// The same for several levels, in the time of little more than one.
   std::vector<Bounds> predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<double>& levels,
-                              int max_threads = 0) const;
+                              int max_threads = 0, const Eigen::VectorXd& weights = {}) const;
 
  private:
   std::vector<Model> models_;
   std::vector<HeldOutPart> parts_;
+  std::vector<Gap> gaps_;
 };
 
 /// A model and the intervals that were made with it.
@@ -84,7 +95,8 @@ struct ModelWithIntervals {
 /// Quantiles of each output, rows x probabilities; see quantiles_from(). Throws std::invalid_argument as
 /// levels_of_quantiles() and Intervals::predict().
 std::vector<Eigen::MatrixXd> quantiles(const ModelWithIntervals& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                       const std::vector<double>& probabilities, int max_threads = 0);
+                                       const std::vector<double>& probabilities, int max_threads = 0,
+                                       const Eigen::VectorXd& weights = {});
 
 /// The text of to_json(model) with the intervals as one member more, if there are any. Throws std::invalid_argument if
 /// the intervals belong to another model: if a model of theirs has other numbers of inputs, outputs or levels, names

@@ -88,7 +88,7 @@ std::vector<int> deal(const std::vector<int>& units, const Regime& regime, std::
   const Eigen::Index count = std::ranges::max(units) + 1;
   if (count < fewest_groups) {
     throw std::invalid_argument(
-        fmt::format("llmt::fit_boosted: there are {} groups of rows, at least {} are needed", count, fewest_groups));
+        fmt::format("llmt::fit_boosted: groups of rows: {}; at least {} are needed", count, fewest_groups));
   }
   const Eigen::Index num_parts = std::min(num_parts_of(regime, std::ssize(units)), count);
   const std::vector<Eigen::Index> order = Random(seed).permutation(count);
@@ -248,6 +248,7 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
   result.y = given.outputs.values(different.first, Eigen::all);
   result.rows.weights = Eigen::Map<const Eigen::VectorXd>(different.weights.data(), count);
   if (given.weights.size() > 0 && !given.are_counts) result.rows.weights /= result.rows.weights.mean();
+  if (given.weights.size() > 0 && !given.are_counts) result.precisions = given.weights(different.first);
   result.rows.equal_weights = (result.rows.weights.array() == 1.0).all();
   describe_columns(data, given, result);
   if (few) return result;  // nothing can be held out

@@ -30,6 +30,7 @@ struct BoostingData {
   std::vector<int> parts;          ///< of each row; hold_outs[k] holds the part k out
   bool is_hold_out_given = false;  ///< TrainingData::held_out: these rows are not fitted to
   Eigen::MatrixXd x;               ///< inputs of the rows
+  Eigen::VectorXd precisions;      ///< weights of the rows as given, if they are no counts; empty: none
 };
 
 /// Throws std::invalid_argument as fit_boosted().

@@ -7,6 +7,7 @@
 #include "boosted/race.hpp"
 #include "llmt/boosted.hpp"
 #include "llmt/statistics.hpp"
+#include "spread/fit_gaps.hpp"
 #include "spread/fit_spread.hpp"
 
 namespace llmt {
@@ -43,15 +44,18 @@ std::vector<SumResiduals> held_out_residuals(const BoostingData& data, Eigen::In
   const Eigen::MatrixXd x = with_empty_levels(data.inputs, data.x(of.rows, Eigen::all));
   const Eigen::VectorXd predictions = data.y.col(output)(of.rows) - residuals;
   const Eigen::VectorXd errors = residuals.cwiseAbs();
-  const std::vector<Spread> spreads = fit_spreads({x, data.inputs, predictions, errors}, of.part, of.parts);
-  if (std::ranges::all_of(spreads, [](const Spread& spread) { return spread.nodes.empty(); })) {
+  const Eigen::VectorXd weights = data.precisions.size() > 0 ? data.precisions(of.rows).eval() : Eigen::VectorXd();
+  const std::vector<Spread> spreads = fit_spreads({x, data.inputs, predictions, errors, weights}, of.part, of.parts);
+  if (std::ranges::all_of(spreads, &Spread::is_even)) {
     return {{ascending({errors.begin(), errors.end()}, most)}};
   }
   std::vector<SumResiduals> parts;
   for (int p = 0; p < of.parts; ++p) {
     std::vector<double> scaled;
     for (Eigen::Index i = 0; i < errors.size(); ++i) {
-      if (of.part[i] == p) scaled.push_back(errors(i) / spread_at(spreads[p], x, i, predictions(i)));
+      if (of.part[i] != p) continue;
+      const double spread = spread_at(spreads[p], x, i, predictions(i));
+      scaled.push_back(errors(i) / (weights.size() > 0 ? spread * factor_of_weight(spreads[p], weights(i)) : spread));
     }
     parts.push_back({ascending(std::move(scaled), most / static_cast<std::size_t>(of.parts)), spreads[p]});
   }
@@ -206,6 +210,19 @@ Spread with_columns(const Spread& spread, const std::vector<int>& columns) {
   return moved;
 }
 
+// The gaps of all rows in all numbers, where the caller has them.
+std::vector<Gap> gaps_of(const BoostingData& data) {
+  std::vector<int> columns;
+  for (int j = 0; j < std::ssize(data.inputs); ++j) {
+    if (!data.inputs[j].is_categorical()) columns.push_back(j);
+  }
+  std::vector<Gap> gaps = fit_gaps(data.x, columns);
+  for (Gap& gap : gaps) {
+    for (GapSide& side : gap.sides) side.column = data.columns[side.column];
+  }
+  return gaps;
+}
+
 // The model with its inputs where the caller has them.
 BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
   std::vector<InputColumn> inputs(data.inputs.size());
@@ -221,7 +238,7 @@ BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
     }
     for (SumResiduals& part : sum.held_out) part.spread = with_columns(part.spread, data.columns);
   }
-  return {std::move(inputs), data.outputs, std::move(deviations), std::move(sums)};
+  return {std::move(inputs), data.outputs, std::move(deviations), std::move(sums), gaps_of(data)};
 }
 
 }  // namespace

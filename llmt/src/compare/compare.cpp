@@ -18,6 +18,7 @@
 #include "fit/prepare.hpp"
 #include "fit/robust_weights.hpp"
 #include "growth/rules/rule.hpp"
+#include "llmt/crps.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt {
@@ -129,24 +130,100 @@ BoostedModel boost_part(const GivenRows& rows, const Method& method, double shar
   return fit_boosted(data, *method.boosted, part.progress()).model;
 }
 
-// What the method, fitted to some rows, says of others.
-Eigen::MatrixXd predictions(const GivenRows& fitted, const Method& method, const Eigen::MatrixXd& inputs, double share,
-                            Work& work) {
-  if (method.boosted) return boost_part(fitted, method, share, work).predict(inputs);
-  return fit_part(fitted, method.options, share, work).model.predict(inputs);
+constexpr double level_of_coverage = 0.9;
+constexpr int quantiles_of_crps = 20;
+
+// What a method says of rows that it has not seen.
+struct Forecast {
+  Eigen::MatrixXd predictions;
+  std::vector<Bounds> bounds;  // at the levels of the quantiles and, last, that of coverage; empty: too few rows
+};
+
+std::vector<double> levels_of_forecast() {
+  std::vector<double> levels = levels_of_quantiles(crps_probabilities(quantiles_of_crps));
+  levels.push_back(level_of_coverage);
+  return levels;
 }
 
-// The held-out errors of a method: fills in fold_rmse, cv_rmse and spread. `share`: of a fit in the work.
+Eigen::Index rows_of(const Intervals& intervals) {
+  Eigen::Index rows = 0;
+  for (const HeldOutPart& part : intervals.parts()) rows += part.residuals.rows() + part.incomplete.rows();
+  return rows;
+}
+
+Eigen::Index rows_of(const BoostedModel& model) {
+  Eigen::Index rows = 0;
+  for (const SumResiduals& part : model.sums().front().held_out) rows += std::ssize(part.residuals);
+  return rows;
+}
+
+// What the method, fitted to some rows, says of others. `weights`: of these; empty: none.
+Forecast forecast(const GivenRows& fitted, const Method& method, const Eigen::MatrixXd& inputs,
+                  const Eigen::VectorXd& weights, double share, Work& work) {
+  Forecast result;
+  if (method.boosted) {
+    const BoostedModel model = boost_part(fitted, method, share, work);
+    result.predictions = model.predict(inputs);
+    if (rows_of(model) >= fewest_rows_of_crps)
+      result.bounds = model.intervals(inputs, levels_of_forecast(), 1, weights);
+    return result;
+  }
+  FitOptions options = method.options;
+  options.intervals = true;
+  const FitResult fit = fit_part(fitted, options, share, work);
+  result.predictions = fit.model.predict(inputs);
+  if (rows_of(fit.intervals) < fewest_rows_of_crps) return result;
+  for (Bounds& bounds : fit.intervals.predict(inputs, levels_of_forecast(), 1, weights)) {
+    result.bounds.push_back(holding(std::move(bounds), result.predictions));
+  }
+  return result;
+}
+
+// The coverage and the CRPS of some rows, added to those of others.
+struct IntervalMeans {
+  WeightedMean inside;
+  WeightedMean score;
+  bool has_all = true;  // whether there are intervals of all rows
+
+  void add(const Forecast& forecast, const Eigen::VectorXd& observed, const Eigen::VectorXd& weights) {
+    has_all = has_all && !forecast.bounds.empty();
+    if (!has_all) return;
+    std::vector<Bounds> bounds = forecast.bounds;
+    const Bounds of_coverage = std::move(bounds.back());
+    bounds.pop_back();
+    const Eigen::VectorXd scores =
+        crps(quantiles_from(bounds, forecast.predictions, crps_probabilities(quantiles_of_crps)).front(), observed);
+    for (Eigen::Index i = 0; i < observed.size(); ++i) {
+      const bool holds = of_coverage.lower(i, 0) <= observed(i) && observed(i) <= of_coverage.upper(i, 0);
+      inside.add(holds ? 1.0 : 0.0, weights(i));
+      score.add(scores(i), weights(i));
+    }
+  }
+};
+
+// The weights of some rows, with 1 in the place of 0, a weight that no interval has and that no error counts.
+Eigen::VectorXd positive_weights(const Eigen::VectorXd& weights, const std::vector<Eigen::Index>& rows) {
+  if (weights.size() == 0) return {};
+  const Eigen::VectorXd some = weights(rows);
+  return (some.array() > 0.0).select(some, 1.0);
+}
+
+// The held-out errors of a method: fills in fold_rmse, cv_rmse, spread, coverage and crps. `share`: of a fit in the
+// work.
 void judge_on_folds(const GivenRows& given, const Method& method, const Eigen::VectorXd& error_weights,
                     const std::vector<Fold>& folds, double share, Work& work, Comparison& entry) {
   WeightedMean all;
+  IntervalMeans of_intervals;
   entry.fold_rmse.resize(std::ssize(folds));
   for (std::size_t f = 0; f < folds.size(); ++f) {
     const Fold& fold = folds[f];
-    const Eigen::VectorXd error =
-        predictions(rows_at(given, fold.train), method, given.inputs.values(fold.held_out, Eigen::all), share, work) -
-        Eigen::MatrixXd(given.outputs.values(fold.held_out, Eigen::all));
+    const Forecast of_fold =
+        forecast(rows_at(given, fold.train), method, given.inputs.values(fold.held_out, Eigen::all),
+                 positive_weights(given.weights, fold.held_out), share, work);
+    const Eigen::VectorXd observed = given.outputs.values(fold.held_out, 0);
+    const Eigen::VectorXd error = of_fold.predictions.col(0) - observed;
     const Eigen::VectorXd weights = error_weights(fold.held_out);
+    of_intervals.add(of_fold, observed, weights);
     const auto add = [&](RowSpan block, WeightedMean& squares) {
       for (Eigen::Index i = block.begin; i < block.end; ++i) squares.add(error(i) * error(i), weights(i));
     };
@@ -156,6 +233,9 @@ void judge_on_folds(const GivenRows& given, const Method& method, const Eigen::V
   }
   entry.cv_rmse = std::sqrt(all.value());
   entry.spread = spread_of(entry.fold_rmse);
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  entry.coverage = of_intervals.has_all ? of_intervals.inside.value() : unknown;
+  entry.crps = of_intervals.has_all ? of_intervals.score.value() : unknown;
 }
 
 // The time of a prediction of a million rows.

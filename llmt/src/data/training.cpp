@@ -234,6 +234,7 @@ KeptRows keep(const GivenRows& given, const FoldOptions& folds) {
                 .weights = all && std::ssize(counted) == count
                                ? weights
                                : scaled_weights(weights(without.left), std::ssize(rows)),
+                .precisions = given.are_counts ? Eigen::VectorXd() : values_at(given.weights, rows),
                 .loss_weights = values_at(given.loss_weights, rows),
                 .has_repeats = equal.are_repeats,
                 .is_fold_given = !given.held_out.empty()};

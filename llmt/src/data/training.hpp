@@ -78,6 +78,7 @@ struct KeptRows {
   SharedMatrix inputs;
   SharedMatrix outputs;
   Eigen::VectorXd weights = {};         ///< positive, those of copies added, the largest 1
+  Eigen::VectorXd precisions = {};      ///< weights as given, if they are no counts; empty: none
   Eigen::VectorXd loss_weights = {};    ///< as GivenRows
   std::vector<double> groups = {};      ///< as GivenRows
   std::vector<Eigen::Index> rows = {};  ///< their places among the given rows, ascending

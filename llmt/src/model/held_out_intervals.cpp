@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "model/incomplete.hpp"
+#include "spread/fit_gaps.hpp"
 #include "spread/fit_spread.hpp"
 
 namespace llmt {
@@ -55,19 +56,21 @@ double usual_size(const Eigen::VectorXd& differences) {
 // What the spreads of all outputs divide: one spread an output for each part, none if all are 1 everywhere.
 std::vector<std::vector<Spread>> divide_by_spreads(const std::vector<InputColumn>& columns, const Eigen::MatrixXd& x,
                                                    const Eigen::MatrixXd& predictions, const DealtFolds& dealt,
-                                                   Eigen::MatrixXd& residuals, Eigen::MatrixXd& differences) {
+                                                   const Eigen::VectorXd& weights, Eigen::MatrixXd& residuals,
+                                                   Eigen::MatrixXd& differences) {
   std::vector<std::vector<Spread>> spreads(dealt.parts);
   bool has_spread = false;
   for (Eigen::Index o = 0; o < residuals.cols(); ++o) {
     std::vector<Spread> of_output =
-        fit_spreads({x, columns, predictions.col(o), residuals.col(o)}, dealt.part, dealt.parts);
+        fit_spreads({x, columns, predictions.col(o), residuals.col(o), weights}, dealt.part, dealt.parts);
     for (Eigen::Index i = 0; i < residuals.rows(); ++i) {
-      const double spread = spread_at(of_output[dealt.part[i]], x, i, predictions(i, o));
-      residuals(i, o) /= spread;
+      const Spread& of_part = of_output[dealt.part[i]];
+      const double spread = spread_at(of_part, x, i, predictions(i, o));
+      residuals(i, o) /= weights.size() > 0 ? spread * factor_of_weight(of_part, weights(i)) : spread;
       differences(i, o) /= spread;
     }
     for (int p = 0; p < dealt.parts; ++p) {
-      has_spread = has_spread || !of_output[p].nodes.empty();
+      has_spread = has_spread || !of_output[p].is_even();
       spreads[p].push_back(std::move(of_output[p]));
     }
   }
@@ -75,10 +78,22 @@ std::vector<std::vector<Spread>> divide_by_spreads(const std::vector<InputColumn
   return spreads;
 }
 
+// The gaps of all rows in the numbers that the models use.
+std::vector<Gap> gaps_of(const std::vector<Model>& models, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  std::vector<int> columns;
+  std::vector<std::vector<bool>> used;
+  for (const Model& model : models) used.push_back(used_inputs(model));
+  for (std::size_t j = 0; j < models.front().inputs().size(); ++j) {
+    const bool is_used = std::ranges::any_of(used, [&](const std::vector<bool>& of_model) { return of_model[j]; });
+    if (is_used && !models.front().inputs()[j].is_categorical()) columns.push_back(static_cast<int>(j));
+  }
+  return fit_gaps(inputs, columns);
+}
+
 }  // namespace
 
 Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                             const Eigen::Ref<const Eigen::MatrixXd>& outputs,
+                             const Eigen::Ref<const Eigen::MatrixXd>& outputs, const Eigen::VectorXd& precisions,
                              const std::vector<std::span<const int>>& held_out, int max_threads) {
   if (models.empty()) return {};
   const bool is_one_fold = models.size() == 1;
@@ -91,7 +106,9 @@ Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const E
   for (Eigen::Index i = 0; i < x.rows(); ++i) predictions.row(i) = by_model[is_one_fold ? 0 : folds.part[i]].row(i);
   Eigen::MatrixXd residuals = (outputs(folds.rows, Eigen::all) - predictions).cwiseAbs();
   Eigen::MatrixXd differences = differences_of_folds(predictions, by_model);
-  std::vector<std::vector<Spread>> spreads = divide_by_spreads(columns, x, predictions, folds, residuals, differences);
+  const Eigen::VectorXd weights = precisions.size() > 0 ? precisions(folds.rows).eval() : Eigen::VectorXd();
+  std::vector<std::vector<Spread>> spreads =
+      divide_by_spreads(columns, x, predictions, folds, weights, residuals, differences);
   const std::vector<bool> incomplete = incomplete_rows(models, x);
   std::vector<HeldOutPart> parts;
   for (int p = 0; p < folds.parts; ++p) {
@@ -111,7 +128,8 @@ Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const E
       part.disagreement.push_back(usual_size(differences.col(o)(whole)));
     }
   }
-  return {std::move(models), std::move(parts)};
+  std::vector<Gap> gaps = gaps_of(models, inputs);
+  return {std::move(models), std::move(parts), std::move(gaps)};
 }
 
 }  // namespace llmt

@@ -141,6 +141,21 @@ void check_disagreement(const std::vector<double>& disagreement, std::size_t par
   }
 }
 
+// By how much spreads are larger in gaps, of each output.
+std::vector<double> factors_in_gaps(const std::vector<HeldOutPart>& parts, Eigen::Index outputs) {
+  std::vector<double> factors;
+  for (Eigen::Index o = 0; o < outputs; ++o) {
+    std::vector<ScaledResiduals> residuals;
+    for (const HeldOutPart& part : parts) {
+      for (const Eigen::MatrixXd* kind : {&part.residuals, &part.incomplete}) {
+        residuals.push_back({{kind->col(o).data(), static_cast<std::size_t>(kind->rows())}});
+      }
+    }
+    factors.push_back(factor_in_gaps(residuals));
+  }
+  return factors;
+}
+
 std::vector<HeldOutPart> parts_of(std::vector<Eigen::MatrixXd> residuals, std::vector<Eigen::MatrixXd> incomplete) {
   if (!incomplete.empty() && incomplete.size() != residuals.size()) {
     refuse_intervals(fmt::format("{} and {} matrices of residuals", residuals.size(), incomplete.size()));
@@ -157,8 +172,9 @@ std::vector<HeldOutPart> parts_of(std::vector<Eigen::MatrixXd> residuals, std::v
 
 }  // namespace
 
-Intervals::Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts)
-    : models_(std::move(models)), parts_(std::move(parts)) {
+Intervals::Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts, std::vector<Gap> gaps)
+    : models_(std::move(models)), parts_(std::move(parts)), gaps_(std::move(gaps)) {
+  check_gaps(gaps_, models_.empty() ? 0 : models_.front().num_inputs());
   for (std::size_t k = 0; k < models_.size(); ++k) {
     if (const std::string difference = difference_of_columns(models_[k], models_[0]); !difference.empty()) {
       refuse_intervals(fmt::format("fold {} and fold 0 differ: {}", k, difference));
@@ -191,15 +207,18 @@ Intervals::Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> res
                      std::vector<Eigen::MatrixXd> incomplete)
     : Intervals(std::move(models), parts_of(std::move(residuals), std::move(incomplete))) {}
 
-Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads) const {
-  return predict(inputs, std::vector<double>{level}, max_threads).front();
+Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads,
+                          const Eigen::VectorXd& weights) const {
+  return predict(inputs, std::vector<double>{level}, max_threads, weights).front();
 }
 
 std::vector<Bounds> Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                       const std::vector<double>& levels, int max_threads) const {
+                                       const std::vector<double>& levels, int max_threads,
+                                       const Eigen::VectorXd& weights) const {
   if (empty()) {
     refuse_intervals("there are no held-out residuals; fit with folds and with FitOptions::intervals = true");
   }
+  check_row_weights("llmt::Intervals", weights, inputs.rows());
   const Eigen::Index lacking = count_rows(parts_, &HeldOutPart::incomplete);
   std::vector<std::vector<Calibration>> of_complete;
   std::vector<std::vector<Calibration>> of_incomplete;
@@ -216,6 +235,8 @@ std::vector<Bounds> Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& 
   const Eigen::Index outputs = predicted[0].cols();
   const Eigen::VectorXd usual = usual_disagreement(parts_, outputs);
   const Eigen::MatrixXd at = at_positions(models_[0].inputs(), inputs);
+  const std::vector<Eigen::Index> in_gap = rows_in_gaps(gaps_, inputs);
+  const std::vector<double> in_gaps = factors_in_gaps(parts_, in_gap.empty() ? 0 : outputs);
   std::vector<Bounds> bounds(levels.size());
   for (Bounds& each : bounds) each.lower = each.upper = Eigen::MatrixXd(inputs.rows(), outputs);
   constexpr Eigen::Index block = 256;
@@ -229,6 +250,12 @@ std::vector<Bounds> Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& 
           estimates[p] = {prediction, spreads.empty() ? 1.0 : spread_at(spreads[o], at, row, prediction)};
         }
         draw_together(estimates, usual[o]);
+        if (std::ranges::binary_search(in_gap, row)) {
+          for (Estimate& estimate : estimates) estimate.spread *= in_gaps[static_cast<std::size_t>(o)];
+        }
+        for (std::size_t p = 0; weights.size() > 0 && p < parts_.size(); ++p) {
+          if (!parts_[p].spreads.empty()) estimates[p].spread *= factor_of_weight(parts_[p].spreads[o], weights(row));
+        }
         for (std::size_t k = 0; k < levels.size(); ++k) {
           const auto& calibrations = incomplete[row] ? of_incomplete[k] : of_complete[k];
           const auto [lower, upper] = hull_at(parts_, estimates, calibrations, o);
@@ -239,6 +266,7 @@ std::vector<Bounds> Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& 
     }
   });
   for (std::size_t k = 0; k < levels.size(); ++k) {
+    bounds[k].in_gap = in_gap;
     const bool has_few = values_outside(levels[k], lacking) < 1;
     for (Eigen::Index row = 0; has_few && row < inputs.rows(); ++row) {
       if (incomplete[row]) bounds[k].uncalibrated.push_back(row);
@@ -248,8 +276,9 @@ std::vector<Bounds> Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& 
 }
 
 std::vector<Eigen::MatrixXd> quantiles(const ModelWithIntervals& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                       const std::vector<double>& probabilities, int max_threads) {
-  return quantiles_from(model.intervals.predict(inputs, levels_of_quantiles(probabilities), max_threads),
+                                       const std::vector<double>& probabilities, int max_threads,
+                                       const Eigen::VectorXd& weights) {
+  return quantiles_from(model.intervals.predict(inputs, levels_of_quantiles(probabilities), max_threads, weights),
                         model.model.predict(inputs, max_threads), probabilities);
 }
 

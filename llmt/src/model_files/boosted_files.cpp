@@ -64,7 +64,7 @@ Json of_tree(const BoostedTree& tree) {
 
 // Without spreads as programs before them read it. Those find no residuals where there are some.
 void write_held_out(const std::vector<SumResiduals>& parts, Json& json) {
-  if (parts.size() == 1 && parts.front().spread.nodes.empty()) {
+  if (parts.size() == 1 && parts.front().spread.is_even()) {
     json["residuals"] = parts.front().residuals;
     return;
   }
@@ -187,6 +187,7 @@ std::string to_json(const BoostedModel& model) {
         {{"base", sum.base}, {"rate", sum.rate}, {"features", std::move(features)}, {"trees", std::move(trees)}});
     write_held_out(sum.held_out, json["sums"].back());
   }
+  if (!model.gaps().empty()) json["gaps"] = json_of(model.gaps());
   return compact_text(json);
 }
 
@@ -207,10 +208,13 @@ BoostedModel boosted_from_json(const std::string& text, const std::string& name)
   }
   std::vector<BoostedSum> sums;
   for (const JsonReader& sum : root.member("sums").elements()) sums.push_back(sum_from(sum));
+  std::vector<Gap> gaps = gaps_from(root);
   try {
-    return {std::move(inputs), std::move(outputs), std::move(deviations), std::move(sums)};
+    return {std::move(inputs), std::move(outputs), std::move(deviations), std::move(sums), std::move(gaps)};
   } catch (const BoostedFault& fault) {
     root.fail_at(fault.pointer(), fault.problem());
+  } catch (const std::invalid_argument& error) {
+    root.member("gaps").fail(error.what());
   }
 }
 

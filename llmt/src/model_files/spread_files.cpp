@@ -13,7 +13,35 @@ Json json_of(const Spread& spread) {
   }
   Json json = {{"nodes", std::move(nodes)}};
   if (!spread.levels.empty()) json["levels"] = spread.levels;
+  if (spread.noise_share > 0.0) {
+    json["noise_share"] = spread.noise_share;
+    json["usual_weight"] = spread.usual_weight;
+  }
   return json;
+}
+
+Json json_of(const std::vector<Gap>& gaps) {
+  Json json = Json::array();
+  for (const Gap& gap : gaps) {
+    Json sides = Json::array();
+    for (const GapSide& side : gap.sides) sides.push_back({side.column, side.low, side.high});
+    json.push_back(std::move(sides));
+  }
+  return json;
+}
+
+std::vector<Gap> gaps_from(const JsonReader& model) {
+  std::vector<Gap> gaps;
+  if (!model.has("gaps")) return gaps;
+  for (const JsonReader& entry : model.member("gaps").elements()) {
+    Gap& gap = gaps.emplace_back();
+    for (const JsonReader& side : entry.elements()) {
+      const std::vector<JsonReader> parts = side.elements();
+      if (parts.size() != 3) side.fail("a side of a gap has 3 numbers: a column, and the ends");
+      gap.sides.push_back({parts[0].as<int>(), parts[1].as<double>(), parts[2].as<double>()});
+    }
+  }
+  return gaps;
 }
 
 Spread spread_from(const JsonReader& json) {
@@ -34,6 +62,10 @@ Spread spread_from(const JsonReader& json) {
     node.left = parts[3].as<int>();
     node.right = parts[4].as<int>();
     if (node.left < 0) parts[3].fail("it must not be negative");
+  }
+  if (json.has("noise_share")) {
+    spread.noise_share = json.member("noise_share").as<double>();
+    spread.usual_weight = json.member("usual_weight").as<double>();
   }
   if (!json.has("levels")) return spread;
   for (const JsonReader& values : json.member("levels").elements()) spread.levels.push_back(values.list<double>());

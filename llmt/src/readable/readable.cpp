@@ -232,7 +232,8 @@ Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr
     held_out.emplace_back(setting.folds[f].held_out.rows);
   }
   const Table& table = *setting.training.table;
-  return held_out_intervals(std::move(models), table.inputs, table.outputs, held_out, setting.plan.max_threads);
+  return held_out_intervals(std::move(models), table.inputs, table.outputs, setting.training.kept->precisions, held_out,
+                            setting.plan.max_threads);
 }
 
 }  // namespace

@@ -202,6 +202,47 @@ class Grower {
   std::vector<Leaf> leaves_;  // one a node; empty where that is a split
 };
 
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Of all errors, with a part of the median of those that are learnt from added.
+Eigen::VectorXd logs_of(const Eigen::VectorXd& all, const std::vector<int>& learnt) {
+  const Eigen::VectorXd errors = all(learnt);
+  const double middle = median({errors.begin(), errors.end()});
+  return (all.array() + floor_of_errors * (middle > 0.0 ? middle : errors.mean())).log();
+}
+
+Eigen::VectorXd factors_of_weights(const Spread& spread, const Eigen::VectorXd& weights) {
+  return weights.unaryExpr([&](double weight) { return factor_of_weight(spread, weight); });
+}
+
+// A spread without nodes whose share of noise leaves the logarithms of the errors alike: with the smallest variance.
+Spread spread_of_weights(const ErrorRows& rows, const std::vector<int>& learnt) {
+  Spread best;
+  if (rows.weights.size() == 0) return best;
+  const Eigen::VectorXd weights = rows.weights(learnt);
+  best.usual_weight = median({weights.begin(), weights.end()});
+  const Eigen::VectorXd logs = logs_of(rows.errors, learnt)(learnt);
+  double smallest = std::numeric_limits<double>::infinity();
+  constexpr int steps = 20;
+  for (int k = 0; k <= steps; ++k) {
+    const double noise = k * k;  // finest near 0 and 1, where one of the two terms is small
+    const double rest = (steps - k) * (steps - k);
+    Spread spread = best;
+    spread.noise_share = noise / (noise + rest);
+    const Eigen::ArrayXd left = logs.array() - factors_of_weights(spread, weights).array().log();
+    const double squares = (left - left.mean()).square().sum();
+    if (squares < smallest * (1.0 - 1e-9)) {  // equal weights leave the share at 0
+      smallest = squares;
+      best = spread;
+    }
+  }
+  return best;
+}
+
 // What a spread is learnt from, but for the values of levels, which depend on the rows that are learnt from.
 class SpreadFit {
  public:
@@ -221,11 +262,12 @@ class SpreadFit {
     columns_.push_back(binned({rows.predictions.begin(), rows.predictions.end()}));
   }
 
-  Spread learnt_from(std::vector<int> learnt) const {
-    Spread spread;
+  // Adds to `spread` what the errors, which its factors of weight have been taken out of, say.
+  Spread learnt_from(std::vector<int> learnt, const Eigen::VectorXd& errors, Spread spread) const {
+    const Spread without_nodes = spread;
     std::vector<Column> of_levels(counts_.size());
     std::vector<const Column*> columns;
-    const Eigen::VectorXd logs = logs_of(learnt);
+    const Eigen::VectorXd logs = logs_of(errors, learnt);
     const double mean = logs(learnt).mean();
     for (std::size_t j = 0; j < counts_.size(); ++j) {
       columns.push_back(counts_[j].empty() ? &columns_[j] : &of_levels[j]);
@@ -246,22 +288,11 @@ class SpreadFit {
       of_levels[j] = binned(of_rows);
     }
     columns.push_back(&columns_.back());
-    spread.nodes = Grower(columns, logs, rows_.errors).grow(std::move(learnt));
-    if (spread.nodes.size() == 1) return {};
-    return spread;
+    spread.nodes = Grower(columns, logs, errors).grow(std::move(learnt));
+    return spread.nodes.size() == 1 ? without_nodes : spread;
   }
 
  private:
-  // Of all errors, with a part of the median of those that are learnt from added.
-  Eigen::VectorXd logs_of(const std::vector<int>& learnt) const {
-    const Eigen::VectorXd errors = rows_.errors(learnt);
-    std::vector<double> sorted(errors.begin(), errors.end());
-    const auto middle = sorted.begin() + std::ssize(sorted) / 2;
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    const double size = *middle > 0.0 ? *middle : errors.mean();
-    return (rows_.errors.array() + floor_of_errors * size).log();
-  }
-
   std::optional<std::size_t> level_at(Eigen::Index row, std::size_t input) const {
     const double value = rows_.inputs(row, static_cast<Eigen::Index>(input));
     const bool is_known = value >= 0.0 && value < static_cast<double>(rows_.columns[input].levels.size());
@@ -277,7 +308,7 @@ class SpreadFit {
 
 std::vector<Spread> fit_spreads(const ErrorRows& rows, const std::vector<int>& part, int parts) {
   std::vector<Spread> spreads(parts);
-  if (rows.errors.size() < fewest_rows_of_spread || parts < 2) return spreads;
+  if (parts < 2) return spreads;
   std::vector<std::vector<int>> others(parts);
   for (int p = 0; p < parts; ++p) {
     for (std::size_t row = 0; row < part.size(); ++row) {
@@ -285,8 +316,16 @@ std::vector<Spread> fit_spreads(const ErrorRows& rows, const std::vector<int>& p
     }
     if (others[p].empty() || !(rows.errors(others[p]).maxCoeff() > 0.0)) return spreads;
   }
+  for (int p = 0; p < parts; ++p) spreads[p] = spread_of_weights(rows, others[p]);
+  if (rows.errors.size() < fewest_rows_of_spread) return spreads;
   const SpreadFit fit(rows);
-  for (int p = 0; p < parts; ++p) spreads[p] = fit.learnt_from(std::move(others[p]));
+  for (int p = 0; p < parts; ++p) {
+    Eigen::VectorXd errors = rows.errors;
+    if (spreads[p].noise_share > 0.0) {
+      errors = errors.cwiseQuotient(factors_of_weights(spreads[p], rows.weights));
+    }
+    spreads[p] = fit.learnt_from(std::move(others[p]), errors, std::move(spreads[p]));
+  }
   return spreads;
 }
 

@@ -23,10 +23,12 @@ struct ErrorRows {
   const std::vector<InputColumn>& columns;   ///< of the inputs
   Eigen::VectorXd predictions;               ///< of each row, of the model that has not seen it
   Eigen::VectorXd errors;                    ///< absolute ones
+  Eigen::VectorXd weights = {};              ///< positive, of precision; empty: none
 };
 
 /// One spread for each of `parts` parts, (I.1) of docs/algorithms/intervals.md, learnt from the rows of the other
-/// parts. `part`: of each row. Spreads without nodes if the rows are too few, or the errors of some part are all zero.
+/// parts. `part`: of each row. Spreads without nodes if the rows are too few; even ones if the errors of all parts but
+/// one are zero.
 std::vector<Spread> fit_spreads(const ErrorRows& rows, const std::vector<int>& part, int parts);
 
 /// Numbers 0 ... parts - 1 of `rows` rows, as many of each, at random.

@@ -109,6 +109,17 @@ std::vector<Eigen::MatrixXd> quantiles_from(const std::vector<Bounds>& bounds,
   return quantiles;
 }
 
+double factor_in_gaps(std::span<const ScaledResiduals> parts) {
+  Eigen::Index rows = 0;
+  for (const ScaledResiduals& part : parts) rows += std::ssize(part.residuals);
+  const auto percentile = [&](double level) {
+    return largest_value(parts, std::max<Eigen::Index>(values_outside(level, rows), 1));
+  };
+  if (rows == 0) return 1.0;
+  const double usual = percentile(0.9);
+  return usual > 0.0 ? percentile(0.99) / usual : 1.0;
+}
+
 Eigen::Index values_outside(double level, Eigen::Index rows) {
   constexpr double slack = 1.0 + 1e-12;  // keeps 0.1 * 30 from becoming 2
   const auto outside = static_cast<Eigen::Index>(std::floor((1.0 - level) * static_cast<double>(rows + 1) * slack));

@@ -21,6 +21,9 @@ struct ScaledResiduals {
 /// logarithm of the number of residuals.
 double largest_value(std::span<const ScaledResiduals> parts, Eigen::Index rank);
 
+/// By how much intervals are wider in a Gap: the 99th percentile of residuals over their 90th; 1 if that is 0.
+double factor_in_gaps(std::span<const ScaledResiduals> parts);
+
 /// Number of values that lie outside an interval at either end: floor(a (n + 1)) with a = 1 - level.
 Eigen::Index values_outside(double level, Eigen::Index rows);
 

@@ -51,6 +51,21 @@ double spread_at(const Spread& spread, const Eigen::Ref<const Eigen::MatrixXd>& 
   return node->factor;
 }
 
+double factor_of_weight(const Spread& spread, double weight) {
+  return std::sqrt(1.0 - spread.noise_share + spread.noise_share * spread.usual_weight / weight);
+}
+
+void check_row_weights(const char* what, const Eigen::VectorXd& weights, Eigen::Index rows) {
+  if (weights.size() == 0) return;
+  if (weights.size() != rows) {
+    throw std::invalid_argument(fmt::format("{}: there are {} weights for {} rows", what, weights.size(), rows));
+  }
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    if (weights(row) > 0.0 && std::isfinite(weights(row))) continue;
+    throw std::invalid_argument(fmt::format("{}: weights({}) is {}, it must be positive", what, row, weights(row)));
+  }
+}
+
 Eigen::MatrixXd with_empty_levels(const std::vector<InputColumn>& columns,
                                   const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
   Eigen::MatrixXd result = inputs;
@@ -63,6 +78,12 @@ Eigen::MatrixXd with_empty_levels(const std::vector<InputColumn>& columns,
 }
 
 void check_spread(const Spread& spread, const std::vector<InputColumn>& inputs) {
+  if (!(spread.noise_share >= 0.0 && spread.noise_share <= 1.0)) {
+    refuse(fmt::format("the share of noise is {}, it must be from 0 to 1", spread.noise_share));
+  }
+  if (!(spread.usual_weight > 0.0 && std::isfinite(spread.usual_weight))) {
+    refuse(fmt::format("the usual weight is {}, it must be positive", spread.usual_weight));
+  }
   if (spread.nodes.empty()) {
     if (!spread.levels.empty()) refuse("it has levels and no nodes");
     return;

@@ -287,6 +287,10 @@ TEST(Spread, ThatIsNoTreeIsRefused) {
   for (const double factor : {0.0, -1.0, 2e6, oracle::missing}) {
     EXPECT_NE(refusal([&](llmt::Spread& s) { s.nodes[1].factor = factor; }), "nothing was thrown") << factor;
   }
+  EXPECT_EQ(refusal([](llmt::Spread& s) { s.noise_share = 1.5; }),
+            "llmt::Spread: the share of noise is 1.5, it must be from 0 to 1");
+  EXPECT_EQ(refusal([](llmt::Spread& s) { s.usual_weight = 0.0; }),
+            "llmt::Spread: the usual weight is 0, it must be positive");
   EXPECT_EQ(refusal([](llmt::Spread& s) { s.nodes.emplace_back(); }),
             "llmt::Spread: each node but the first needs one parent");
 }

@@ -154,12 +154,14 @@ double value_of(const BoostedTree& tree, const double* z) {
 }
 
 BoostedModel::BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
-                           std::vector<double> deviations, std::vector<BoostedSum> sums)
+                           std::vector<double> deviations, std::vector<BoostedSum> sums, std::vector<Gap> gaps)
     : inputs_(std::move(inputs)),
       outputs_(std::move(outputs)),
       deviations_(std::move(deviations)),
-      sums_(std::move(sums)) {
+      sums_(std::move(sums)),
+      gaps_(std::move(gaps)) {
   check_boosted(inputs_, outputs_, deviations_, sums_);
+  check_gaps(gaps_, num_inputs());
 }
 
 BoostedSize size_of(const BoostedModel& model) {
@@ -237,27 +239,37 @@ bool BoostedModel::has_intervals() const {
   return std::ranges::none_of(sums_, [](const BoostedSum& sum) { return sum.held_out.empty(); });
 }
 
-Bounds BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads) const {
-  return intervals(inputs, std::vector<double>{level}, max_threads).front();
+Bounds BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads,
+                               const Eigen::VectorXd& weights) const {
+  return intervals(inputs, std::vector<double>{level}, max_threads, weights).front();
 }
 
 std::vector<Bounds> BoostedModel::intervals(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                            const std::vector<double>& levels, int max_threads) const {
+                                            const std::vector<double>& levels, int max_threads,
+                                            const Eigen::VectorXd& weights) const {
+  check_row_weights("llmt::BoostedModel::intervals", weights, inputs.rows());
   const Eigen::MatrixXd predicted = predict(inputs, max_threads);
   const Eigen::MatrixXd at = with_empty_levels(inputs_, inputs);
-  std::vector<Bounds> bounds(levels.size(), Bounds{predicted, predicted});
+  const std::vector<Eigen::Index> in_gap = rows_in_gaps(gaps_, inputs);
+  std::vector<Bounds> bounds(levels.size(), Bounds{.lower = predicted, .upper = predicted, .in_gap = in_gap});
   for (Eigen::Index o = 0; o < num_outputs(); ++o) {
     const std::vector<SumResiduals>& parts = sums_[o].held_out;
     Eigen::Index rows = 0;
     for (const SumResiduals& part : parts) rows += std::ssize(part.residuals);
     for (const double level : levels) check_level("llmt::BoostedModel::intervals", level, rows);
+    std::vector<ScaledResiduals> residuals;
+    for (const SumResiduals& part : parts) residuals.push_back({part.residuals});
+    const double factor = factor_in_gaps(residuals);
     const RowBlocks blocks{inputs.rows(), rows_at_once};
     parallel_for(blocks.count(), max_threads, [&](Eigen::Index block) {
       const auto [begin, end] = blocks[block];
       std::vector<ScaledResiduals> scaled(parts.size());
       for (Eigen::Index row = begin; row < end; ++row) {
+        const double in_gaps = std::ranges::binary_search(in_gap, row) ? factor : 1.0;
         for (std::size_t p = 0; p < parts.size(); ++p) {
-          scaled[p] = {parts[p].residuals, 0.0, spread_at(parts[p].spread, at, row, predicted(row, o))};
+          const double spread = spread_at(parts[p].spread, at, row, predicted(row, o));
+          const double by_weight = weights.size() > 0 ? factor_of_weight(parts[p].spread, weights(row)) : 1.0;
+          scaled[p] = {parts[p].residuals, 0.0, spread * by_weight * in_gaps};
         }
         for (std::size_t k = 0; k < levels.size(); ++k) {
           const double width = largest_value(scaled, values_outside(levels[k], rows));
@@ -271,8 +283,9 @@ std::vector<Bounds> BoostedModel::intervals(const Eigen::Ref<const Eigen::Matrix
 }
 
 std::vector<Eigen::MatrixXd> quantiles(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                       const std::vector<double>& probabilities, int max_threads) {
-  return quantiles_from(model.intervals(inputs, levels_of_quantiles(probabilities), max_threads),
+                                       const std::vector<double>& probabilities, int max_threads,
+                                       const Eigen::VectorXd& weights) {
+  return quantiles_from(model.intervals(inputs, levels_of_quantiles(probabilities), max_threads, weights),
                         model.predict(inputs, max_threads), probabilities);
 }
 
