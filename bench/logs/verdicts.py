@@ -92,15 +92,15 @@ def regime_right(case, answer, run):
     return False
 
 
-def names_right(case, answer, error):
-    """alone: exactly the truth is named; group: each name is the truth or has it among its rivals, and the function is
-    within 10 %; listed: every true term is named or a rival, among others."""
+def names_right(case, answer, error, in_vain):
+    """alone: exactly the truth is named, its size to a quarter unless nothing can be gained; group: each name is the
+    truth or has it among its rivals, and the function is within 10 %; listed: every true term is named or a rival."""
     wanted, effects = truth_labels(case), answer["effects"]
     if not wanted or case.hidden.regime:
         return {"alone": False, "group": False, "listed": False}
     said = [label(e["name"], e["location"]) for e in effects]
     quiet = not answer.get("unknown") and not said_inner(answer)
-    alone = sorted(said) == sorted(wanted) and quiet and error <= NAMED
+    alone = sorted(said) == sorted(wanted) and quiet and (error <= NAMED or in_vain)
     left, covered = list(wanted), 0
     for effect, name in zip(effects, said):
         match = next((w for w in left if w == name), None) or next((w for w in left if w in rivals(effect)), None)
@@ -176,7 +176,7 @@ def judge(case, walk):
         "cover": coverage(case, answer),
         "time": answer.get("time"),
     }
-    result |= names_right(case, answer, error if error is not None else math.inf)
+    result |= names_right(case, answer, math.inf if error is None else error, result["allowed"]["nothing"])
     result["regime_named"] = bool(case.hidden.regime) and regime_right(case, answer, first.run)
     result["right"] = bool(is_right(case, result))
     return result

@@ -231,11 +231,12 @@ def case(seed):
 def complete(rng, made, size, share):
     """Draws noise, free parameters and what is hidden of a machine whose nominal model is known."""
     machine = made.machine
-    fine = fine_run(made, 1)
+    fine, t = fine_run(made, 1), np.arange(made.samples) / made.rate
     spread = float(np.std(fine.target))
     noise, made.size = share * spread, size
     made.chain = measure.draw(rng, machine, made.amplitudes, noise, 1 / made.rate, made.cutoff, made.in_loop)
-    made.chain = measure.with_plausible_clocks(made.chain, fine.t, fine.target)
+    targets = [fine_run(made, number, 1).target for number in (1, 2)]
+    made.chain = measure.with_plausible_clocks(made.chain, t, targets, made.cutoff)
     names = list(machine.parameters)
     must = made.kind in ("parameters", "both")
     if must or rng.uniform() < 0.6:

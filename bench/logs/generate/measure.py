@@ -17,7 +17,7 @@ class Chain:
     coloured: float  # share of the variance of the target's noise that is AR(1)
     memory: float  # s, of that part
     counts: float  # resolution of the target
-    late: float  # s, of the target
+    late: float  # s, of the target; negative: ahead
     drift: float  # s, by which its clock is off at the end
 
 
@@ -37,20 +37,29 @@ def draw(rng, machine, amplitudes, noise, sample, cutoff, in_loop):
     extras = {name: amplitudes[name] * 10 ** -rng.uniform(2.0, 3.5) for name in machine.extras}
     share = 0.0 if rng.uniform() < 0.5 else rng.uniform(0.2, 1.0)
     memory = sample * (0.5 / cutoff / sample) ** rng.uniform(0.2, 1.0)
-    late = sample * 10 ** rng.uniform(-1.3, 0.0) if rng.uniform() < 0.25 else 0.0
+    late = sample * 10 ** rng.uniform(-1.3, 0.0) * rng.choice([-1, 1]) if rng.uniform() < 0.25 else 0.0
     drift = sample * 10 ** rng.uniform(-1.3, 0.3) if rng.uniform() < 0.2 else 0.0
     return Chain(resolutions, jitter, extras, noise, share, memory, noise * rng.uniform(0.05, 1.0), late, drift)
 
 
-def with_plausible_clocks(chain, t, target):
-    """Delays that are part of the measurement move the target by at most 0.3 of its noise: the rest would be hidden."""
+def filtered_noise(chain, sample, cutoff):
+    """Standard deviation of the target's noise behind an ideal low pass."""
+    white = (1 - chain.coloured) * min(1.0, 2 * cutoff * sample)
+    slow = chain.coloured * 2 / np.pi * np.arctan(2 * np.pi * cutoff * max(chain.memory, sample / 2))
+    return chain.noise * np.sqrt(white + slow)
+
+
+def with_plausible_clocks(chain, t, targets, cutoff):
+    """Clocks of the measurement move the target of no run by more than 0.3 of its noise in the rows: more would be
+    hidden."""
     seconds = t[-1] - t[0]
+    most = 0.3 * filtered_noise(chain, t[1] - t[0], cutoff)
     for name in ("late", "drift"):
         by = getattr(chain, name)
         delay = by if name == "late" else by * (t - t[0]) / seconds
-        moved = np.sqrt(np.mean((np.interp(t - delay, t, target) - target) ** 2))
-        if moved > 0.3 * chain.noise:
-            chain = dataclasses.replace(chain, **{name: by * 0.3 * chain.noise / moved})
+        moved = max(np.sqrt(np.mean((np.interp(t - delay, t, target) - target) ** 2)) for target in targets)
+        if moved > most:
+            chain = dataclasses.replace(chain, **{name: by * most / moved})
     return chain
 
 
