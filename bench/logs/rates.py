@@ -99,8 +99,9 @@ def demands():
     yield "right as a whole", KINDS, lambda r: answered(r) and r["right"]
 
 
-def cover(results, kinds, only_right):
-    chosen = [r for r in results if r["kind"] in kinds and answered(r) and (r["right"] or not only_right)]
+def cover(results, test):
+    """How many intervals of parameters hold the true value."""
+    chosen = [r for r in results if answered(r) and test(r)]
     inside, count = (sum(r["cover"][k] for r in chosen) for k in (0, 1))
     if not count:
         return "-"
@@ -137,8 +138,10 @@ def tables(results):
     yield ""
     for name, kinds, test in demands():
         yield f"{name:52} {rate([r for r in results if r['kind'] in kinds], test)}"
-    yield f"{'intervals of parameters: complete, parameters off':52} {cover(results, ('complete', 'parameters'), False)}"
-    yield f"{'  every right answer':52} {cover(results, KINDS, True)}"
+    complete = lambda r: r["kind"] in ("complete", "parameters")
+    yield f"{'intervals of parameters: complete, parameters off':52} {cover(results, complete)}"
+    named = lambda r: complete(r) or r["alone"] or r["group"]
+    yield f"{'  and where the effects are named rightly':52} {cover(results, named)}"
     gains = [r["gain"] for r in results if answered(r) and r["gain"] is not None and r["kind"] != "complete"]
     yield f"{'median gain of the second run (after/before)':52} {middle(gains)}"
     seconds = [r["seconds"].get("discover", 0.0) for r in results]

@@ -52,11 +52,15 @@ def regime_of(effect):
     return (match[1], float(match[2])) if match else None
 
 
+def is_state(effect):
+    return bool(effect.get("inner_state")) or effect["name"] in INNER
+
+
 def said_inner(answer):
     kind = str((answer.get("unknown") or {}).get("kind", ""))
     return (
         "inner state" in answer["verdict"] or "remembers" in answer["verdict"] or "remembers" in kind
-        or any(e.get("inner_state") or e["name"] in INNER for e in answer["effects"])
+        or any(is_state(e) for e in answer["effects"])
     )
 
 
@@ -146,9 +150,9 @@ def judge(case, walk):
     nominal, alone, true = rests = way.rests(case, walk)
     after = way.rms(second.table["u"] - walk.corrected) if walk.corrected is not None else None
     known = truth_labels(case) if not case.hidden.regime else []
-    inner_names = INNER if case.kind == "inner" else ()
+    past = way.by_past(case)
     confirmed = [e for e in answer["effects"] if e["confirmed"]]
-    strange = [e for e in confirmed if label(e["name"], e["location"]) not in known and e["name"] not in inner_names]
+    strange = [e for e in confirmed if label(e["name"], e["location"]) not in known and not (past and is_state(e))]
     if case.hidden.regime and regime_right(case, answer, first.run):
         strange = []
     verdict, off = answer["verdict"], error is None or error > TWIN
