@@ -32,6 +32,7 @@ def arguments():
     parser.add_argument("--keep", metavar="FOLDER", help="write the files of each seed into FOLDER/SEED")
     parser.add_argument("--options", default="", help="further options of discover, separated by blanks")
     parser.add_argument("--tell-noise", action="store_true", help="hand the noise that signals reports to --input-noise")
+    parser.add_argument("--through-filter", action="store_true", help="the user filters the simulation as the log was")
     parser.add_argument("--limit", type=int, default=300, metavar="SECONDS", help="CPU time of a search; default: %(default)s")
     parser.add_argument("--list", default="", metavar="KIND,...", help="print a line for each run of these kinds, or all")
     options = parser.parse_args()

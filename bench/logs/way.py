@@ -63,21 +63,50 @@ def execute(words, folder, limit):
     return (out.read_text() if child.returncode == 0 else None), message, seconds
 
 
-def signals(program, case, number, folder):
-    """Rows of a run and CPU seconds."""
-    run = generate.run(case, number)
-    log, table = f"{folder}/log{number}.csv", f"{folder}/rows{number}.csv"
-    write(log, run.log)
+def filtered(program, case, log, extra, folder, more=()):
+    """`llmt signals` of a log; columns of `extra` are filtered alone. Output is None if it failed."""
     words = [program, "signals", log, "--time", "t", "--position", ",".join(case.machine.coordinates)]
-    words += ["--torque", ",".join(["u", *case.machine.extras]), "--cutoff", f"{case.cutoff:.6g}", "--json", "-o", table]
-    text, message, seconds = execute(words, folder, 60)
+    words += ["--torque", ",".join(extra), "--cutoff", f"{case.cutoff:.6g}", "--json", "-o", f"{folder}/table.csv", *more]
+    return execute(words, folder, 60)
+
+
+def nominal(case, rows):
+    """The nominal simulation at rows, and its derivatives by the free parameters."""
+    simulated = structure.output(case.machine, rows, case.machine.parameters)
+    return simulated, {name: case.machine.columns[name](rows) for name in case.free}
+
+
+def nominal_through_filter(program, case, log, rows, folder):
+    """The same at all samples and through the filter of the log, at those of the rows that lie within its reach."""
+    all_samples = ("--every", "1", "--standstill", "0")
+    filtered(program, case, log, ["u", *case.machine.extras], folder, all_samples)
+    dense = read(f"{folder}/table.csv")
+    simulated, derivatives = nominal(case, dense)
+    columns = {"sim": simulated} | {f"by_{name}": x for name, x in derivatives.items()}
+    positions = {name: dense[name] for name in ("t", *case.machine.coordinates)}
+    write(f"{folder}/dense.csv", positions | columns)
+    filtered(program, case, f"{folder}/dense.csv", list(columns), folder, all_samples)
+    smooth = read(f"{folder}/table.csv")
+    inside = (rows["t"] >= smooth["t"][0]) & (rows["t"] <= smooth["t"][-1])
+    at = np.searchsorted(smooth["t"], rows["t"][inside] - 0.5 / case.rate)
+    return inside, smooth["sim"][at], {name: smooth[f"by_{name}"][at] for name in case.free}
+
+
+def signals(program, case, number, folder, through_filter=False):
+    """Rows of a run and CPU seconds."""
+    run, log = generate.run(case, number), f"{folder}/log{number}.csv"
+    write(log, run.log)
+    text, message, seconds = filtered(program, case, log, ["u", *case.machine.extras], folder)
     if text is None:
         return None, message, seconds
-    rows = read(table)
-    at = np.clip(np.round(rows["t"] * case.rate).astype(int), 0, len(run.t) - 1)
-    nominal = structure.output(case.machine, rows, case.machine.parameters)
-    derivatives = {name: case.machine.columns[name](rows) for name in case.free}
-    return Rows(rows, json.loads(text)["noise"], nominal, derivatives, run, at), message, seconds
+    table = read(f"{folder}/table.csv")
+    simulated, derivatives = nominal(case, table)
+    if through_filter:
+        inside, simulated, derivatives = nominal_through_filter(program, case, log, table, folder)
+        table = {name: x[inside] for name, x in table.items()}
+    write(f"{folder}/rows{number}.csv", table)
+    at = np.clip(np.round(table["t"] * case.rate).astype(int), 0, len(run.t) - 1)
+    return Rows(table, json.loads(text)["noise"], simulated, derivatives, run, at), message, seconds
 
 
 def whole(case, number):
@@ -121,24 +150,23 @@ def apply(program, case, columns, simulated, derivatives, folder):
 def true_rows(case, rows):
     """Signals without noise and filter at the instants of the rows, nominal simulation and derivatives there."""
     s = {name: x[rows.at] for name, x in rows.run.signals.items()}
-    derivatives = {name: case.machine.columns[name](s) for name in case.free}
-    return s | {"t": rows.table["t"]}, structure.output(case.machine, s, case.machine.parameters), derivatives
+    return s | {"t": rows.table["t"]}, *nominal(case, s)
 
 
 def walk(program, case, folder, options):
-    first, message, spent = signals(program, case, 1, folder)
-    second, other, more = signals(program, case, 2, folder)
+    first, message, spent = signals(program, case, 1, folder, options.through_filter)
+    second, other, more = signals(program, case, 2, folder, options.through_filter)
     seconds = {"signals": spent + more}
     if first is None or second is None:
         return Walk(None, "signals: " + (message or other), seconds, (first, second), None, None, None)
     answer, message, seconds["discover"] = discover(program, case, first, folder, options)
-    columns, nominal, derivatives = true_rows(case, second)
-    missing = hidden_at(case, second, columns, nominal)
+    columns, exact, derivatives = true_rows(case, second)
+    missing = hidden_at(case, second, columns, exact)
     if answer is None:
         return Walk(None, message, seconds, (first, second), None, missing, None)
-    exact, message = apply(program, case, columns, nominal, derivatives, folder)
+    by_answer, message = apply(program, case, columns, exact, derivatives, folder)
     corrected, _ = apply(program, case, second.table, second.simulated, second.derivatives, folder)
-    added = exact - nominal if exact is not None else None
+    added = by_answer - exact if by_answer is not None else None
     return Walk(answer, message, seconds, (first, second), added, missing, corrected)
 
 
@@ -177,22 +205,22 @@ def rests(case, walk):
 
 def true_gap(case, rows):
     """What is hidden, at the true signals of the rows."""
-    columns, nominal, _ = true_rows(case, rows)
-    return hidden_at(case, rows, columns, nominal)
+    columns, simulated, _ = true_rows(case, rows)
+    return hidden_at(case, rows, columns, simulated)
 
 
 def imitation(case, rows):
     """Of an effect outside every family: what the best single term of the library, beside the free parameters, leaves
     of it at the true signals of the rows (share of the root mean square)."""
-    few, nominal, derivatives = true_rows(case, rows)
-    gap, best = hidden_at(case, rows, few, nominal), 1.0
+    few, simulated, derivatives = true_rows(case, rows)
+    gap, best = hidden_at(case, rows, few, simulated), 1.0
     columns = [*derivatives.values(), np.ones(len(gap))]
     for family in (*terms.OF_OUTPUT, *terms.ONE, *terms.TWO):
         for place in terms.applicable(family, few, list(dict.fromkeys(case.given))):
             for position in ((a, b) for a in np.linspace(0, 1, 6) for b in (0.1, 0.9)):
                 constants = terms.constants_of(family, few[place[0]], position) if len(place) == 1 else ()
                 term = terms.Term(family, place, constants)
-                tried = terms.basis(term, few, nominal)
+                tried = terms.basis(term, few, simulated)
                 if all(np.all(np.isfinite(x)) for x in tried):
                     best = min(best, truth.beside(gap, columns + tried))
                 if not constants:

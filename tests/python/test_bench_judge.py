@@ -220,7 +220,7 @@ def test_the_way_of_a_user_leads_to_a_judged_line(tmp_path):
 
     import judge
 
-    options = argparse.Namespace(program=PROGRAM, words=[], tell_noise=False, limit=60)
+    options = argparse.Namespace(program=PROGRAM, words=[], tell_noise=False, through_filter=False, limit=60)
     result = judge.run(options, 1, str(tmp_path))
     assert result["kind"] == "parameters" and result["verdict"] and len(result["rests"]) == 4
     nominal, alone, true, after = result["rests"]
