@@ -83,6 +83,8 @@ def follow(machine, parameters, motions, hidden, jumps, sensors, noise, sample, 
     seen_before, speed = None, [0.0] * n
     rows, shown_rows, total = [], [], np.zeros(3 * n + 1)
     for k in range(count * finer):
+        if not all(abs(q[i]) < limit[i] for i in range(n)):
+            return None
         shown = [round((q[i] + noise[k, i]) / sensors[i]) * sensors[i] for i in range(n)]
         if seen_before is not None:
             speed = [s + forget * ((x - y) / step - s) for s, x, y in zip(speed, shown, seen_before)]
@@ -118,8 +120,6 @@ def follow(machine, parameters, motions, hidden, jumps, sensors, noise, sample, 
         if k % finer == finer - 1:
             rows.append(total / finer)
             total = np.zeros(3 * n + 1)
-            if not all(abs(q[i]) < limit[i] for i in range(n)):
-                return None
         q = [q[i] + 0.5 * step * (v[i] + new[i]) for i in range(n)]
         v = new
     table = np.array(rows)
