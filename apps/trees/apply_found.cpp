@@ -174,6 +174,10 @@ void apply_found(const ApplyArguments& arguments) {
   const report::FoundTerms found = report::found_terms(read_file(arguments.found, description_limit), arguments.found);
   std::string text;
   if (!arguments.code.empty()) {
+    if (!found.refused.empty()) {
+      throw std::runtime_error(fmt::format("{}: there is nothing to write as code: the verdict of the search is \"{}\"",
+                                           found.file, found.refused));
+    }
     write_code(arguments.code, found);
     text += fmt::format("Correction written to {}\n", arguments.code);
   }
@@ -198,7 +202,10 @@ void apply_found(const ApplyArguments& arguments) {
   table.corrected = report::apply(found, table.values, table.simulated, derivatives_of(arguments, found, table.values),
                                   times.of_rows);
   if (!arguments.corrected.empty()) write_corrected(arguments.corrected, table);
-  const std::vector<std::string> outside = report::outside_sentences(found, table.values);
+  std::vector<std::string> outside = report::outside_sentences(found, table.values);
+  if (!found.refused.empty()) {
+    outside = {fmt::format("nothing is added, because the verdict of the search is \"{}\"", found.refused)};
+  }
   const Gaps gaps = is_measured ? gaps_of(table, times) : Gaps();
   if (arguments.json) {
     Json notes = gaps.grown;

@@ -149,6 +149,21 @@ def test_what_is_found_makes_the_replay_of_another_run_right():
     assert len(after.time) == len(after.measured) == len(after.simulated)
 
 
+def expression_of(name, x, values):
+    """As ``llmt discover --json`` writes it."""
+    return {
+        "linear": lambda k: f"{k}*({x})",
+        "sign": lambda k: f"{k}*(sign({x}))",
+        "signed_square": lambda k: f"{k}*({x}*abs({x}))",
+        "cube": lambda k: f"{k}*({x}^3)",
+        "tanh": lambda k, c: f"{k}*(tanh({x}/{c}))",
+        "harmonic1": lambda a, b: f"{a}*(cos(1*{x})) + {b}*(sin(1*{x}))",
+        "product": lambda k: f"{k}*(x*dx)",
+        "gain": lambda k: f"{k}*(u)",
+        "square_of_acceleration": lambda k: f"{k}*(ddx^2)",
+    }.get(name, lambda *_: None)(*values)
+
+
 class Found:
     """A result with given terms, as apply() reads one."""
 
@@ -162,12 +177,15 @@ class Found:
                 "location": location,
                 "output": "u",
                 "formula": name,
+                "expression": expression_of(name, location, values),
+                "regime": None,
                 "parameters": [{"value": value} for value in values],
             }
             | self.marks
             for name, location, *values in self.terms
         ]
-        columns = {"inputs": [{"name": name} for name in ("x", "dx", "ddx")], "outputs": [{"name": "u"}]}
+        inputs = [{"name": name, "word": name, "low": -1.0, "high": 1.0} for name in ("x", "dx", "ddx")]
+        columns = {"inputs": inputs, "outputs": [{"name": "u", "word": "u"}], "order": "", "unknown_all": []}
         return {"verdict": self.verdict, "parameters": self.parameters, "effects": effects} | columns
 
 
@@ -182,18 +200,27 @@ def test_terms_of_the_own_motion_become_fields():
     assert model.dof_armature[0] == pytest.approx(0.2) and model.jnt_stiffness[0] == pytest.approx(7.0)
 
 
-@pytest.mark.parametrize("family, values", [("signed_square", [1.5]), ("tanh", [0.7, 0.2]), ("cube", [0.4])])
+@pytest.mark.parametrize(
+    "family, values",
+    [("signed_square", [1.5]), ("tanh", [0.7, 0.2]), ("cube", [0.4]), ("harmonic1", [0.3, -0.8]), ("product", [2.0])],
+)
 def test_forces_have_the_sign_that_gives_the_needed_torque(family, values):
     """Forward dynamics with the callback, then inverse dynamics of the model without it: the term is what is left."""
     cart = mujoco.MjSpec.from_string(CART)
     fixed, callback = lm.apply(Found((family, "dx", *values)), cart)
     model = fixed.compile()
     data = mujoco.MjData(model)
-    data.qvel[0], data.qfrc_applied[0] = 0.6, 4.0
+    data.qpos[0], data.qvel[0], data.qfrc_applied[0] = 0.2, 0.6, 4.0
     callback(model, data)
     mujoco.mj_forward(model, data)
-    needed = lm.inverse_dynamics(cart)({}, {"x": [0.0], "dx": [0.6], "ddx": [float(data.qacc[0])]})[0, 0]
-    term = {"signed_square": 1.5 * 0.6**2, "tanh": 0.7 * np.tanh(3.0), "cube": 0.4 * 0.6**3}[family]
+    needed = lm.inverse_dynamics(cart)({}, {"x": [0.2], "dx": [0.6], "ddx": [float(data.qacc[0])]})[0, 0]
+    term = {
+        "signed_square": 1.5 * 0.6**2,
+        "tanh": 0.7 * np.tanh(3.0),
+        "cube": 0.4 * 0.6**3,
+        "harmonic1": 0.3 * np.cos(0.6) - 0.8 * np.sin(0.6),
+        "product": 2.0 * 0.2 * 0.6,
+    }[family]
     assert 4.0 - needed == pytest.approx(term, abs=1e-6)
 
 
@@ -213,12 +240,17 @@ def test_what_mujoco_cannot_take_is_named():
     with pytest.warns(UserWarning, match="gain of the output"):
         fixed, callback = lm.apply(Found(("gain", "", 0.1)), cart)
     assert callback is None
+    heavier = {"parameters": [{"name": "mass cart", "value": 3.5, "change": 0.5}]}
+    for term in (("gain", "", 0.1), ("square_of_acceleration", "ddx", 0.2)):
+        with pytest.warns(UserWarning, match="nothing is changed: parameters were fitted beside what cannot be put in"):
+            fixed, callback = lm.apply(Found(term, ("cube", "dx", 0.4), **heavier), cart)
+        assert callback is None and fixed.body("cart").mass == 3.0
 
 
 def test_what_the_answer_does_not_stand_for_stays_as_it_was():
     cart = mujoco.MjSpec.from_string(CART)
     heavier = {"parameters": [{"name": "mass cart", "value": 3.01, "change": 0.01}]}
-    for verdict in ("nothing missing", "failed on held-out rows"):
+    for verdict in ("nothing missing", "undecided", "failed on held-out rows"):
         fixed, callback = lm.apply(Found(("cube", "dx", 0.4), verdict=verdict, **heavier), cart)
         assert callback is None and fixed.body("cart").mass == 3.0
     delay = Found(("delay", "", 0.01), verdict="an inner state", inner_state="a delay", **heavier)
@@ -227,4 +259,4 @@ def test_what_the_answer_does_not_stand_for_stays_as_it_was():
     assert callback is None and fixed.body("cart").mass == 3.0
     with pytest.warns(UserWarning, match=r"cube of dx .*did not shrink the gap"):
         fixed, callback = lm.apply(Found(("cube", "dx", 0.4), shrinks_gap=False, **heavier), cart)
-    assert callback is None and fixed.body("cart").mass == 3.01
+    assert callback is None and fixed.body("cart").mass == 3.0

@@ -228,8 +228,12 @@ FoundTerms found_terms(const Json& json, const std::string& file) {
       found.group = json["time"].value("group", "");
       found.step = json["time"].value("step", 0.0);
     }
-    for (const Json& parameter : json.at("parameters")) read_parameter(parameter, found);
-    read_terms(json, found);
+    if (json.value("may_be_applied", true)) {
+      for (const Json& parameter : json.at("parameters")) read_parameter(parameter, found);
+      read_terms(json, found);
+    } else {
+      found.refused = json.at("verdict").get<std::string>();
+    }
   } catch (const Json::exception& error) {
     throw std::runtime_error(fmt::format("{} is not what llmt discover --json prints: {}", file, error.what()));
   }

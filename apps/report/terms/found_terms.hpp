@@ -51,6 +51,9 @@ struct FoundTerms {
   double step = 0.0;  ///< of the times of the search; 0: not known
   std::vector<Term> terms;
   std::vector<Change> changes;  ///< of parameters of the simulation
+  /// The verdict of a search that has found nothing to be added, discovery::may_be_applied(); then there are no terms
+  /// and no changes. Empty: there is something.
+  std::string refused;
 
   std::vector<std::string> input_names() const;
   std::vector<std::string> output_names() const;

@@ -235,6 +235,7 @@ Json terms_json(const TermsSummary& summary) {
         {{"effect", term.what}, {"amplitude", finite_or_null(term.coefficient)}, {"rms", finite_or_null(term.rms)}});
   }
   Json json = {{"verdict", discovery::to_string(missing.answer)},
+               {"may_be_applied", discovery::may_be_applied(missing)},
                {"effects", effects_json(summary, words)},
                {"unknown", unknown.empty() ? Json(nullptr) : unknown[0]},
                {"unknown_all", unknown},

@@ -57,7 +57,7 @@ TEST(AveragedRows, AreMeansWithinARun) {
   }
 }
 
-TEST(AveragedRows, AreNotMadeWhereInputsChangeFastOrRowsAreFewOrErrorsAreGiven) {
+TEST(AveragedRows, AreNotMadeWhereInputsChangeFastOrRowsAreFew) {
   Log log;
   const auto is_averaged = [&](Eigen::Index fewest) {
     return averaged(log.inputs, log.measured, {.largest_sample = 50}, fewest).has_value();
@@ -65,7 +65,10 @@ TEST(AveragedRows, AreNotMadeWhereInputsChangeFastOrRowsAreFewOrErrorsAreGiven) 
   EXPECT_TRUE(is_averaged(most));
   EXPECT_FALSE(is_averaged(rows / 2 + 1));
   log.inputs.noise = Eigen::VectorXd::Constant(1, 0.01);
-  EXPECT_FALSE(is_averaged(most));
+  const std::optional<AveragedRows> few = averaged(log.inputs, log.measured, {.largest_sample = 50}, most);
+  ASSERT_TRUE(few);
+  const double length = static_cast<double>(rows) / static_cast<double>(few->blocks.size());
+  EXPECT_NEAR(few->inputs.noise(0), 0.01 / std::sqrt(std::floor(length)), 1e-12);  // that of a mean
   log.inputs.noise = {};
   const Eigen::ArrayXd fast = (2.0 * 3.14159 * 40.0 * log.inputs.instants).array().sin();
   log.inputs.values.col(0) = fast.matrix();

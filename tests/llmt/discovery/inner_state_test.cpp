@@ -77,8 +77,8 @@ TEST(InnerState, DelayIsMeasured) {
   for (std::size_t k = 0; k < delays.size(); ++k) {
     const double delay = delays[k];
     const Missing missing = missing_from(log_of(k + 1, 0.1, [&](double t) { return nominal(t - delay); }));
-    EXPECT_EQ(missing.answer, Answer::inner_state);
-    ASSERT_EQ(missing.found.size(), 1u);
+    EXPECT_EQ(missing.answer, Answer::inner_state) << delay;
+    ASSERT_EQ(missing.found.size(), 1u) << delay << " gain " << missing.verdict.score_gain;
     EXPECT_EQ(missing.found.front().family, "delay");
     EXPECT_EQ(missing.found.front().values.front().unit, "units of time");
     EXPECT_EQ(missing.found.front().coefficients(0), 1.0);  // all of the simulated output is late
@@ -217,6 +217,17 @@ TEST(InnerState, ACorrectionThatMakesTheGapLargerIsWorse) {
   Missing failed = missing_with({{0.5, 0.4}});
   failed.answer = Answer::failed_held_out;
   EXPECT_TRUE(is_worse(failed));
+  // What was fitted to these rows is not to be added to others where the answer does not stand for it.
+  EXPECT_FALSE(may_be_applied(failed));
+  Missing better = missing_with({{0.5, 0.4}});
+  for (const Answer answer : {Answer::named, Answer::indistinguishable, Answer::unknown, Answer::parameters_only,
+                              Answer::inner_state, Answer::nothing_missing, Answer::undecided}) {
+    better.answer = answer;
+    EXPECT_EQ(may_be_applied(better), answer != Answer::nothing_missing && answer != Answer::undecided);
+  }
+  Missing worse = missing_with({{0.5, 0.6}});
+  worse.answer = Answer::named;
+  EXPECT_FALSE(may_be_applied(worse));
 }
 
 // The filter of a recording: a resonance of so much damping is none. One log: others would differ by noise alone, which

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import json
+import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -14,34 +16,17 @@ from llmt._results import Findings
 from ._models import _BODY_KINDS, _compiled, _places, _positions, _set, _value
 
 Force = Callable[[float], float]
+Law = Callable[[np.ndarray, np.ndarray], float]  # of all positions and velocities
 
 
-def _functions() -> dict[str, Callable[..., Any]]:
-    """Terms of one input x, and of a constant c, without their coefficient."""
-    return {
-        "linear": lambda x: x,
-        "square": lambda x: x * x,
-        "cube": lambda x: x**3,
-        "absolute": abs,
-        "sign": np.sign,
-        "signed_square": lambda x: x * abs(x),
-        "step": lambda x, c: float(x > c),
-        "hinge": lambda x, c: max(0.0, x - c),
-        "hinge_below": lambda x, c: max(0.0, c - x),
-        "tanh": lambda x, c: np.tanh(x / c),
-        "asinh": lambda x, c: np.arcsinh(x / c),
-        "signed_power": lambda x, p: np.sign(x) * abs(x) ** p,
-        "limit": lambda x, c: max(-c, min(c, x)),
-        "dead_band": lambda x, c: np.sign(x) * max(0.0, abs(x) - c),
-        "stribeck": lambda x, c: np.sign(x) * np.exp(-((x / c) ** 2)),
-    }
+_NOTHING = ("nothing missing", "undecided", "failed on held-out rows")
 
 
 class _Correction:
     """What is added to a model while it runs: forces, and friction that depends on the velocity."""
 
     def __init__(self) -> None:
-        self.forces: list[tuple[int, str, int, Force]] = []  # joint it acts on, "q" or "dq", joint it depends on
+        self.forces: list[tuple[int, Law]] = []  # joint it acts on
         self.frictions: list[tuple[int, Force]] = []
         self.friction_base: dict[int, float] = {}
 
@@ -50,9 +35,8 @@ class _Correction:
 
     def __call__(self, model: Any, data: Any) -> None:
         """To be called before each step, after ``qfrc_applied`` has been set."""
-        for joint, what, other, force in self.forces:
-            state = data.qpos if what == "q" else data.qvel
-            data.qfrc_applied[joint] -= force(float(state[other]))
+        for joint, law in self.forces:
+            data.qfrc_applied[joint] -= law(data.qpos, data.qvel)
         friction = dict(self.friction_base)
         for joint, function in self.frictions:
             friction[joint] += function(float(data.qvel[joint]))
@@ -80,12 +64,12 @@ def apply(found: Findings, spec: Any) -> tuple[Any, Callable[[Any, Any], None] |
 
     Parameters are set. A term of the needed torque is a force that the model lacks, with the other sign. Of the joint's
     own motion: ``dq`` goes to ``damping``, ``sign(dq)`` to ``frictionloss``, ``ddq`` to ``armature``, ``q`` to
-    ``stiffness``; friction that falls with speed becomes a ``frictionloss`` that the callback sets; other functions of a
-    position or velocity become forces. ``callback(model, data)`` is to be called before each ``mj_step``, after
-    ``qfrc_applied`` has been set. What MuJoCo cannot take (gains, shapes without a name, other terms of accelerations
-    or of several inputs) is left out with a warning that names it, and so is a term that did not shrink the gap on the
-    rows set aside. Where nothing is missing, or where the answer is an inner state, the specification is copied as it
-    is: what stands beside a state was fitted with it.
+    ``stiffness``; friction that falls with speed becomes a ``frictionloss`` that the callback sets; other functions of
+    positions and velocities become forces. ``callback(model, data)`` is to be called before each ``mj_step``, after
+    ``qfrc_applied`` has been set. What MuJoCo cannot take (gains, shapes without a name, other terms of accelerations)
+    is left out with a warning that names it, and so is a term that did not shrink the gap on the rows set aside; if
+    parameters were fitted beside it, nothing is changed. The specification is copied as it is, too, where nothing is
+    missing, and where the answer is undecided or an inner state: what stands beside a state was fitted with it.
     """
     answer = found.to_dict()
     positions = _positions(column["name"] for column in answer["inputs"])
@@ -99,21 +83,28 @@ def apply(found: Findings, spec: Any) -> tuple[Any, Callable[[Any, Any], None] |
     states = [_title(term) for term in answer["effects"] if "inner_state" in term]
     if states:
         warnings.warn(f"nothing is changed: MuJoCo cannot take the inner state {'; '.join(states)}", stacklevel=2)
-    if states or answer["verdict"] in ("nothing missing", "failed on held-out rows"):
+    if states or not answer.get("may_be_applied", True) or answer["verdict"] in _NOTHING:
         return fixed, None
     joints = {joint.name: joint for joint in fixed.joints}
     spec_joints = [
         joints[nominal.joint(k).name] if nominal.joint(k).name in joints else fixed.joints[k] for k in range(nominal.nv)
     ]
-    _set_spec(fixed, spec_joints, nominal, _fitted(answer, nominal))
+    fitted = _fitted(answer, nominal)
+    _set_spec(fixed, spec_joints, nominal, fitted)
     correction = _Correction()
     left_out = []
     for term in answer["effects"]:
         values = [parameter["value"] for parameter in term["parameters"]]
         if not term.get("shrinks_gap", True):
             left_out.append(f"{_title(term)}, which did not shrink the gap on the rows set aside")
-        elif not _add_term(term, values, positions, outputs.index(term["output"]), spec_joints, correction):
+        elif not _add_term(answer, term, values, positions, outputs.index(term["output"]), spec_joints, correction):
             left_out.append(_title(term))
+    if left_out and fitted:
+        warnings.warn(
+            f"nothing is changed: parameters were fitted beside what cannot be put in, {'; '.join(left_out)}",
+            stacklevel=2,
+        )
+        return spec.copy(), None
     if left_out:
         warnings.warn(f"left out of the model: {'; '.join(left_out)}", stacklevel=2)
     for joint, _ in correction.frictions:
@@ -160,7 +151,39 @@ def _set_spec(fixed: Any, joints: Sequence[Any], nominal: Any, values: Mapping[s
         body.fullinertia = np.full(6, np.nan)
 
 
+def _law(answer: Mapping[str, Any], term: Mapping[str, Any], positions: list[str]) -> Law | None:
+    """The term as a function of positions and velocities; None where it depends on more than these."""
+    from llmt import _core
+
+    if term["expression"] is None:
+        return None
+    used = set(re.findall(r"[A-Za-z_]\w*", term["expression"]))
+    if used & {column["word"] for column in answer["outputs"]}:
+        return None
+    places: list[tuple[str, int] | None] = []
+    for column in answer["inputs"]:
+        name, place = column["name"], None
+        for what, prefix in (("q", ""), ("dq", "d")):
+            if name.startswith(prefix) and name[len(prefix) :] in positions:
+                place = (what, positions.index(name[len(prefix) :]))
+        if place is None and column["word"] in used:
+            return None
+        places.append(place)
+    alone = {**answer, "effects": [term], "unknown": None, "unknown_all": [], "parameters": []}
+    names: dict[str, Any] = {}
+    exec(_core.code_of_found(json.dumps(alone), True), names)
+    output = next(column for column in answer["outputs"] if column["name"] == term["output"])
+    function = names["correction" if len(answer["outputs"]) == 1 else f"correction_{output['word']}"]
+
+    def law(q: np.ndarray, dq: np.ndarray) -> float:
+        state = {"q": q, "dq": dq}
+        return float(function(*[0.0 if place is None else float(state[place[0]][place[1]]) for place in places]))
+
+    return law
+
+
 def _add_term(
+    answer: Mapping[str, Any],
     term: Mapping[str, Any],
     values: list[float],
     positions: list[str],
@@ -169,34 +192,27 @@ def _add_term(
     correction: _Correction,
 ) -> bool:
     """Whether MuJoCo can take the term."""
-    family, place = term["name"], term["location"]
-    if family == "offset":
-        correction.forces.append((joint, "q", joint, lambda _: values[0]))
-        return True
-    function = _functions().get(family)
-    own = positions[joint]
-    if function is None:
-        return False
+    family, place, own = term["name"], term["location"], positions[joint]
+    everywhere = term.get("regime") is None
     field = {
         ("linear", f"d{own}"): "damping",
         ("linear", f"dd{own}"): "armature",
         ("sign", f"d{own}"): "frictionloss",
         ("linear", own): "stiffness",
     }.get((family, place))
-    if field is not None:
+    if field is not None and everywhere:
         is_possible = _first(joints[joint], field) + values[0] >= 0.0
         if field == "stiffness":
             is_possible = is_possible and float(joints[joint].springref) == 0.0
         if is_possible:
             _add(joints[joint], field, values[0])
             return True
-    if family == "stribeck" and place == f"d{own}":
+    if family == "stribeck" and place == f"d{own}" and everywhere:
         coefficient, speed = values
         correction.frictions.append((joint, lambda v: coefficient * float(np.exp(-((v / speed) ** 2)))))
         return True
-    for what, prefix in (("q", ""), ("dq", "d")):
-        for other, name in enumerate(positions):
-            if place == prefix + name:
-                correction.forces.append((joint, what, other, lambda x: float(values[0] * function(x, *values[1:]))))
-                return True
-    return False
+    law = _law(answer, term, positions)
+    if law is None:
+        return False
+    correction.forces.append((joint, law))
+    return True

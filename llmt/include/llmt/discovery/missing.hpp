@@ -193,4 +193,9 @@ bool is_drift(const Missing& missing);
 /// explains.
 bool is_worse(const Missing& missing);
 
+/// Whether what was found may be added to a simulation of other rows: the answer is a term, a state or parameters that
+/// are off (also "unknown", with what is known of it), and not is_worse(). Changes of parameters that are not beyond
+/// chance, as where nothing is missing, may not.
+bool may_be_applied(const Missing& missing);
+
 }  // namespace llmt::discovery

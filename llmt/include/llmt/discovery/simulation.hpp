@@ -57,6 +57,13 @@ Simulation linearised(Simulation simulation, const Eigen::MatrixXd& simulated, s
 /// rows in time (TimeUse::found_out) where the inputs are noisy, where there are more than `largest_sample`, or where
 /// what is left is alike in neighbours.
 ///
+/// **Filtered rows** (Inputs::cutoff). Simulation, derivatives and terms go through the low pass that the measured
+/// outputs went through, and samples are rows as far apart as its noise is independent.
+///
+/// When the verdict stands, everything is fitted once more on all rows. Terms of regimes (ModelTerm::regime) are tried
+/// where the others leave something. With MeasuredOutputs::noise, the answer is undecided where nothing was found and
+/// more than 5 times the known noise is left; terms beside so much are not confirmed.
+///
 /// The answer is parameters_only where nothing is missing and k free parameters gain, with n values of each output o,
 ///   sum_o n ln(RSS_o at the nominal values / RSS_o fitted) - k ln(n d) > 0,
 /// and a likelihood ratio as large as theirs has a probability below SearchOptions::false_alarm_rate in noise.

@@ -1,6 +1,8 @@
 #include "discovery/terms/final_fit.hpp"
 
 #include <algorithm>
+#include <optional>
+#include <set>
 
 #include "discovery/terms/errors_of_inputs.hpp"
 #include "discovery/terms/fitted_parameters.hpp"
@@ -29,6 +31,46 @@ void move_parameters(const TermFit& fit, const TermFit& alone, double false_alar
   missing.standard_errors = fit.parameter_errors;
 }
 
+RowSplit with_samples(const RowSplit& split, const std::vector<bool>& kept) {
+  RowSplit some = split;
+  some.searched = {};
+  some.stretches.clear();
+  some.repeats.clear();
+  for (Eigen::Index i = 0; i < split.searched.size(); ++i) {
+    if (!kept[i]) continue;
+    some.searched.add(split.searched, i);
+    if (!split.stretches.empty()) some.stretches.push_back(split.stretches[i]);
+    if (!split.repeats.empty()) some.repeats.push_back(split.repeats[i]);
+  }
+  return some;
+}
+
+// Without the outliers of the search and the samples that are more than 5 noise floors off, as those set aside are
+// judged. None where they are many: then the rows set aside do not agree with what was found.
+std::optional<RowSplit> without_outliers(const TermModel& model, const MeasuredOutputs& measured,
+                                         const Missing& missing, const Eigen::VectorXd& parameters,
+                                         const std::vector<PlacedTerm>& placed, const RowSplit& split) {
+  constexpr double far = 5.0;
+  constexpr double largest_share = 0.15;
+  const Eigen::MatrixXd left =
+      (means_of_filtered(measured.values, split.searched) - means(model.predict(parameters, placed), split.searched))
+          .cwiseAbs();
+  const std::set<Eigen::Index> outliers(missing.outliers.begin(), missing.outliers.end());
+  std::vector<bool> kept(left.rows(), true);
+  for (Eigen::Index i = 0; i < left.rows(); ++i) {
+    for (std::size_t o = 0; o < missing.gaps.size(); ++o) {
+      if (left(i, static_cast<Eigen::Index>(o)) > far * missing.gaps[o].noise_floor) kept[i] = false;
+    }
+  }
+  if (static_cast<double>(std::ranges::count(kept, false)) > largest_share * static_cast<double>(left.rows())) {
+    return std::nullopt;
+  }
+  for (Eigen::Index i = 0; i < left.rows(); ++i) {
+    if (outliers.contains(split.searched.rows_of(i).front())) kept[i] = false;
+  }
+  return with_samples(split, kept);
+}
+
 }  // namespace
 
 void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
@@ -46,20 +88,20 @@ void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const M
   const bool in_time = inputs.instants.size() > 0;
   RowSplit split =
       in_time ? split_in_time(inputs, nothing_aside, rows.fewest_samples) : split_independent(inputs, nothing_aside);
-  std::vector<bool> apart = rows.apart;
-  apart.resize(inputs.values.rows(), false);
-  for (const Eigen::Index row : missing.outliers) apart[row] = true;
-  split = without_rows(split, apart);
+  if (std::ranges::find(rows.apart, true) != rows.apart.end()) split = without_rows(split, rows.apart);
+  std::vector<PlacedTerm> placed;
+  for (const FoundTerm& found : missing.found) {
+    placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
+  }
+  const std::optional<RowSplit> fitting = without_outliers(model, measured, missing, start, placed, split);
+  if (!fitting) return;
+  split = *fitting;
   ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
   TermData data{.samples = split.searched,
                 .measured = means_of_filtered(measured.values, split.searched),
                 .sigma = Eigen::VectorXd::Ones(measured.values.cols()),
                 .stretches = split.stretches,
                 .independent_share = missing.time.independent_share};
-  std::vector<PlacedTerm> placed;
-  for (const FoundTerm& found : missing.found) {
-    placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
-  }
   data.sigma = scatter(model, data, {start, {}, placed, {}});
   hold(model, data, start, placed);
   TermFit fit = fit_terms(model, data, start, placed);

@@ -57,11 +57,13 @@ SimulatedParts parts_of(const Surrogate& surrogate, const Rows& rows, Eigen::Ind
   return {rows.simulated - jumps, jumps};
 }
 
-// Times on both sides of zero, from a fraction of what the signals change in to many times as much.
+// Times on both sides of zero, from a fraction of what the signals change in to many times as much. A time more than
+// twice that of the machine explains nothing, so short ones are tried too.
 std::vector<double> times_around_zero(const Rows& rows) {
   const double lag = median_step(rows) * static_cast<double>(smooth_lag(rows, rows.inputs));
   std::vector<double> times;
-  for (const double factor : {10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.7, 0.45, 0.3, 0.2, 0.1}) {
+  for (const double factor :
+       {10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.7, 0.45, 0.3, 0.2, 0.1, 0.05, 0.02, 0.007, 0.002}) {
     times.push_back(-factor * lag);
   }
   for (Eigen::Index k = std::ssize(times); k-- > 0;) times.push_back(-times[k]);
@@ -85,7 +87,8 @@ ModelTerm delay(const std::shared_ptr<OfRows>& of_rows, const std::shared_ptr<co
     term.columns = [of_rows, surrogate, output_index](const Rows& own, const Eigen::VectorXd& constants) {
       const Derivatives& derivatives = of_rows->at(own, own.inputs);
       const SimulatedParts parts = parts_of(*surrogate, own, output_index);
-      Eigen::MatrixXd column = derivatives.earlier(parts.smooth, constants(0)) - parts.smooth;
+      // Both are on the polynomials, whose errors would count beside a short delay.
+      Eigen::MatrixXd column = derivatives.earlier(parts.smooth, constants(0)) - derivatives.earlier(parts.smooth, 0.0);
       if ((parts.jumps.array() != 0.0).any()) {
         Eigen::MatrixXd earlier = own.inputs;
         for (Eigen::Index j = 0; j < earlier.cols(); ++j) {

@@ -318,10 +318,12 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
   return beyond;
 }
 
-Eigen::MatrixXd InputNoise::scatter() const {
-  Eigen::MatrixXd sum = draws_.front()->change.cwiseAbs2();
-  for (std::size_t k = 1; k < draws_.size(); ++k) sum += draws_[k]->change.cwiseAbs2();
-  return (sum / static_cast<double>(draws_.size())).cwiseSqrt();
+Eigen::VectorXd InputNoise::variances(const Samples& samples) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(draws_.front()->change.cols());
+  for (const std::shared_ptr<const Draw>& draw : draws_) {
+    sum += means(draw->change, samples).cwiseAbs2().colwise().mean().transpose();
+  }
+  return sum / static_cast<double>(draws_.size());
 }
 
 }  // namespace llmt::discovery

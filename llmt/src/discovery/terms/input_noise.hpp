@@ -48,8 +48,8 @@ class InputNoise {
 
   /// d: share of the variance of the simulation that the surrogate describes.
   const Eigen::VectorXd& described() const { return surrogate_.described(); }
-  /// n x d: standard deviation of the simulated outputs that the errors make, row by row.
-  Eigen::MatrixXd scatter() const;
+  /// d: mean square of what the errors add to the simulated outputs of samples.
+  Eigen::VectorXd variances(const Samples& samples) const;
 
  private:
   struct Draw;

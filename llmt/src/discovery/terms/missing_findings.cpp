@@ -287,6 +287,11 @@ bool is_worse(const Missing& missing) {
   return missing.answer == Answer::failed_held_out || left > static_cast<double>(missing.gaps.size());
 }
 
+bool may_be_applied(const Missing& missing) {
+  return missing.answer != Answer::nothing_missing && missing.answer != Answer::undecided &&
+         missing.answer != Answer::failed_held_out && !is_worse(missing);
+}
+
 Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,
            const Eigen::VectorXd& after, double noise_floor) {
   // About what makes a row searched an outlier. A row that only the terms found throw off is none.

@@ -56,14 +56,13 @@ double correlation_time(const RowSplit& split, const Eigen::MatrixXd& deviations
 }
 
 // Of the samples: the noise of an output, and what errors of the inputs do to the simulation.
-void set_known_noise(const MeasuredOutputs& measured, const ErrorsOfInputs& errors, Eigen::Index rows_per_sample,
+void set_known_noise(const MeasuredOutputs& measured, const ErrorsOfInputs& errors, const RowSplit& split,
                      Missing& missing) {
   if (measured.noise.size() == 0) return;
-  Eigen::VectorXd variances = measured.noise.cwiseAbs2();
-  if (errors.noise) variances += errors.noise->scatter().cwiseAbs2().colwise().mean().transpose();
+  Eigen::VectorXd variances = measured.noise.cwiseAbs2() / static_cast<double>(split.rows_per_sample);
+  if (errors.noise) variances += errors.noise->variances(split.searched);
   for (std::size_t o = 0; o < missing.gaps.size(); ++o) {
-    missing.gaps[o].known_noise =
-        std::sqrt(variances(static_cast<Eigen::Index>(o)) / static_cast<double>(rows_per_sample));
+    missing.gaps[o].known_noise = std::sqrt(variances(static_cast<Eigen::Index>(o)));
   }
 }
 
@@ -147,7 +146,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
     missing.gaps.push_back(gap_of(measured.names[o], aside_of(measured.values.col(o) - nominal.col(o)),
                                   aside_of(before), aside_of(after), noise * data.sigma(o)));
   }
-  set_known_noise(measured, errors, split.rows_per_sample, missing);
+  set_known_noise(measured, errors, split, missing);
   bound_by_noise(missing);
   demand_certainty(missing);
   if (in_time) {

@@ -11,6 +11,25 @@
 #include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
+namespace {
+
+std::vector<Crossing> crossings_of(const Eigen::MatrixXd& inputs,
+                                   const std::vector<std::vector<Eigen::Index>>& pieces) {
+  std::vector<Crossing> crossings;
+  for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
+    for (const std::vector<Eigen::Index>& piece : pieces) {
+      for (std::size_t k = 1; k + 2 < piece.size(); ++k) {
+        const double before = inputs(piece[k], j);
+        const double after = inputs(piece[k + 1], j);
+        if (!(before * after < 0.0)) continue;
+        crossings.push_back({{piece[k - 1], piece[k], piece[k + 1], piece[k + 2]}, 0.5 - before / (before - after)});
+      }
+    }
+  }
+  return crossings;
+}
+
+}  // namespace
 
 RowFilter::RowFilter(const Inputs& inputs) {
   const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
@@ -29,13 +48,16 @@ RowFilter::RowFilter(const Inputs& inputs) {
                        step_, inputs.cutoff));
   }
   weights_ = low_pass(inputs.cutoff, step_);
+  crossings_ = std::make_shared<const std::vector<Crossing>>(crossings_of(inputs.values, pieces_));
 }
 
 Eigen::MatrixXd RowFilter::operator()(const Eigen::MatrixXd& of_rows) const {
+  Eigen::MatrixXd jumping = of_rows;
+  for (Eigen::Index c = 0; c < of_rows.cols(); ++c) jumping.col(c) = jumping_at(*crossings_, of_rows.col(c));
   Eigen::MatrixXd filtered = of_rows;
   const Eigen::Index half = weights_.size() / 2;
   for (const std::vector<Eigen::Index>& piece : pieces_) {
-    const Eigen::MatrixXd own = of_rows(piece, Eigen::all);
+    const Eigen::MatrixXd own = jumping(piece, Eigen::all);
     for (Eigen::Index k = 0; k < own.rows(); ++k) {
       const Eigen::Index begin = std::max<Eigen::Index>(0, k - half);
       const Eigen::Index count = std::min(own.rows(), k + half + 1) - begin;

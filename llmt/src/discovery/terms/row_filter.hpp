@@ -2,8 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
+#include "discovery/terms/samples.hpp"
 #include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
@@ -18,6 +20,7 @@ class RowFilter {
   const std::vector<std::vector<Eigen::Index>>& pieces() const { return pieces_; }
   /// 2 h + 1 of them add up to 1.
   const Eigen::VectorXd& weights() const { return weights_; }
+  const std::shared_ptr<const std::vector<Crossing>>& crossings() const { return crossings_; }
   /// Rows after which white noise that was filtered counts as independent.
   Eigen::Index stride() const { return stride_; }
   double step() const { return step_; }
@@ -28,6 +31,7 @@ class RowFilter {
  private:
   std::vector<std::vector<Eigen::Index>> pieces_;
   Eigen::VectorXd weights_;
+  std::shared_ptr<const std::vector<Crossing>> crossings_;
   Eigen::Index stride_ = 1;
   double step_ = 0.0;
 };

@@ -290,6 +290,8 @@ RowSplit split_filtered(const Inputs& inputs, const MissingOptions& options) {
   }
   recording.pieces = filter.pieces();
   RowSplit split;
+  split.searched.set_crossings(filter.crossings());
+  split.held_out.set_crossings(filter.crossings());
   split.step = filter.step() * static_cast<double>(filter.stride());
   const Eigen::Index half = filter.weights().size() / 2;
   Eigen::Index stretch = -1;

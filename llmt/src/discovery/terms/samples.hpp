@@ -2,10 +2,29 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace llmt::discovery {
+
+/// An input passes zero between rows[1] and rows[2] of four that follow each other, at another place than the middle.
+/// What jumps there, as dry friction does, counts at the rows as if it jumped in the middle: the weights on both sides
+/// add up as if each row stood for half a step to either side. With v_k at the rows, the jump is, beside the smooth
+/// change,
+///
+///     J = (v_2 - v_1) - ((v_1 - v_0) + (v_3 - v_2)) / 2,
+///
+/// and v_1, v_2 each become v + shift J / 2. A smooth v has next to no J.
+struct Crossing {
+  std::array<Eigen::Index, 4> rows;
+  double shift = 0.0;  ///< of a step: 1/2 - the share of the step before the crossing
+};
+
+/// A column of values at the rows, as if it jumped where inputs pass zero.
+Eigen::VectorXd jumping_at(const std::vector<Crossing>& crossings, Eigen::VectorXd of_rows);
 
 /// Observations, each the mean over some rows: one row where rows are independent, a block of consecutive rows where
 /// they were taken in time; or one row whose measured outputs went through a filter, and the weighted mean of what is
@@ -28,6 +47,10 @@ class Samples {
     weights_ = weights;
   }
 
+  /// Of what is computed, for samples that are filtered.
+  void set_crossings(std::shared_ptr<const std::vector<Crossing>> crossings) { crossings_ = std::move(crossings); }
+  const std::vector<Crossing>* crossings() const { return crossings_.get(); }
+
   Eigen::Index size() const { return std::ssize(ends_); }
   bool is_filtered() const { return weights_.size() > 0; }
   const Eigen::VectorXd& weights() const { return weights_; }
@@ -45,6 +68,7 @@ class Samples {
   /// Takes a sample of others over, whole.
   void add(const Samples& others, Eigen::Index sample) {
     if (others.is_filtered()) {
+      crossings_ = others.crossings_;
       add(others.rows_of(sample).front(), others.around(sample), others.weights_);
     } else {
       add(others.rows_of(sample));
@@ -56,6 +80,7 @@ class Samples {
   std::vector<Eigen::Index> ends_;
   std::vector<Eigen::Index> around_;
   Eigen::VectorXd weights_;
+  std::shared_ptr<const std::vector<Crossing>> crossings_;
 };
 
 /// The share of the variance of a column that its means, `kept`, keep, 1 where samples are single rows. A column that
