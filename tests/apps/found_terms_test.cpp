@@ -71,6 +71,7 @@ Json json_of(const Sample& sample, std::vector<discovery::FoundTerm> found) {
   summary.ranges = ranges_of(sample.inputs);
   summary.order = sample.inputs.order;
   summary.missing.found = std::move(found);
+  summary.missing.answer = discovery::Answer::named;
   summary.missing.gaps = {{.output = "y"}};
   summary.missing.zero_bands = sample.inputs.zero_bands;
   return terms_json(summary);

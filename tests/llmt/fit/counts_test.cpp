@@ -235,7 +235,15 @@ TEST(Counts, AreNotTakenFromLargeNorFromBrokenWeights) {
   };
   const llmt::FitResult large = model_of(0x1p20);
   const llmt::FitResult small = model_of(0x1p-20);
-  EXPECT_TRUE(to_json(large.model, large.intervals) == to_json(small.model, small.intervals));
+  // Intervals know the usual weight; only ratios to it count.
+  EXPECT_TRUE(to_json(large.model) == to_json(small.model));
+  for (const double ratio : {0.25, 1.0, 9.0}) {
+    const auto of = [&](const llmt::FitResult& result, double factor) {
+      return result.intervals.predict(data.inputs, 0.9, 1, ratio * factor * data.weights);
+    };
+    EXPECT_EQ(of(large, 0x1p20).lower, of(small, 0x1p-20).lower);
+    EXPECT_EQ(of(large, 0x1p20).upper, of(small, 0x1p-20).upper);
+  }
   // A fold of counted rows has 601 rows in all folds, one of weighted rows 588.
   const auto residuals = [](const llmt::FitResult& result) {
     Eigen::Index count = 0;

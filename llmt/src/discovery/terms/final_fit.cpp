@@ -105,6 +105,7 @@ void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const M
   data.sigma = scatter(model, data, {start, {}, placed, {}});
   hold(model, data, start, placed);
   TermFit fit = fit_terms(model, data, start, placed);
+  if (retry_constants(model, data, fit)) fit = fit_terms(model, data, fit.parameters, fit.placed);
   const TermFit alone = fit_terms(model, data, start, {});
   set_trial_errors(model, data, fit);
   correct_estimates(errors, data, fit);

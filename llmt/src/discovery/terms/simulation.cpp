@@ -107,18 +107,6 @@ Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const Measur
   return inputs;
 }
 
-std::vector<std::string> notes_on_rest(const Inputs& inputs) {
-  std::vector<std::string> notes;
-  for (Eigen::Index j = 0; j < inputs.zero_bands.size(); ++j) {
-    if (!(inputs.zero_bands(j) > 0.0)) continue;
-    notes.push_back(fmt::format(
-        "{0} rests at {1} rows, with |{0}| < {2:.3g}. They were set apart, because dry friction at rest may be "
-        "anything up to that of motion. The terms found take {0} for 0 there",
-        inputs.names[j], (inputs.values.col(j).array().abs() < inputs.zero_bands(j)).count(), inputs.zero_bands(j)));
-  }
-  return notes;
-}
-
 // Searches until what is found holds on the rows set aside. Terms that are refuted there are no candidates of the next
 // search, which sets other rows aside. In time, what follows noise that is alike in neighbours lives on few rows: a
 // term must shrink the gap on the rows set aside, of one search or the next.

@@ -1,5 +1,7 @@
 #include "discovery/terms/standstill.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -170,6 +172,18 @@ std::vector<UnknownSign> rows_of_unknown_sign(const Rows& rows, const Inputs& in
     found.push_back(own);
   }
   return found;
+}
+
+std::vector<std::string> notes_on_rest(const Inputs& inputs) {
+  std::vector<std::string> notes;
+  for (Eigen::Index j = 0; j < inputs.zero_bands.size(); ++j) {
+    if (!(inputs.zero_bands(j) > 0.0)) continue;
+    notes.push_back(fmt::format(
+        "{0} rests at {1} rows, with |{0}| < {2:.3g}. They were set apart, because dry friction at rest may be "
+        "anything up to that of motion. The terms found take {0} for 0 there",
+        inputs.names[j], (inputs.values.col(j).array().abs() < inputs.zero_bands(j)).count(), inputs.zero_bands(j)));
+  }
+  return notes;
 }
 
 RowSplit without_rows(const RowSplit& split, const std::vector<bool>& apart) {

@@ -34,6 +34,8 @@ Eigen::VectorXd zero_bands(const Inputs& inputs, const Eigen::MatrixXd& deviatio
 /// Marks the rows at which an input is within its band.
 std::vector<bool> rows_at_rest(const Inputs& inputs);
 
+std::vector<std::string> notes_on_rest(const Inputs& inputs);
+
 /// The split without the rows set apart. A sample keeps those of its rows that are left, if half of them are.
 RowSplit without_rows(const RowSplit& split, const std::vector<bool>& apart);
 
