@@ -239,7 +239,7 @@ TEST(Counts, AreNotTakenFromLargeNorFromBrokenWeights) {
   EXPECT_TRUE(to_json(large.model) == to_json(small.model));
   for (const double ratio : {0.25, 1.0, 9.0}) {
     const auto of = [&](const llmt::FitResult& result, double factor) {
-      return result.intervals.predict(data.inputs, 0.9, 1, ratio * factor * data.weights);
+      return result.intervals.predict(data.inputs, 0.9, 1, ratio * factor * data.weights.cwiseMax(1.0));
     };
     EXPECT_EQ(of(large, 0x1p20).lower, of(small, 0x1p-20).lower);
     EXPECT_EQ(of(large, 0x1p20).upper, of(small, 0x1p-20).upper);
