@@ -154,14 +154,13 @@ TEST(FilteredRows, ACompleteModelWithDryFrictionLacksNothing) {
 
 TEST(FilteredRows, AStateIsFoundBesideDryFriction) {
   const Model model{.dry = 2.0};
-  for (const double delay : {0.03, -0.03}) {
-    const Missing missing =
-        missing_from(rows_of_log(1, model, 0.05, [&](double t) { return model.torque(motion(t - delay)); }));
-    EXPECT_EQ(missing.answer, Answer::inner_state) << delay;
-    ASSERT_EQ(missing.found.size(), 1u) << delay;
-    EXPECT_EQ(missing.found.front().family, "delay");
-    EXPECT_NEAR(missing.found.front().values.front().value, delay, 0.002);
-  }
+  constexpr double delay = -0.03;  // a command, ahead of the torque
+  const Missing missing =
+      missing_from(rows_of_log(1, model, 0.05, [&](double t) { return model.torque(motion(t - delay)); }));
+  EXPECT_EQ(missing.answer, Answer::inner_state);
+  ASSERT_EQ(missing.found.size(), 1u);
+  EXPECT_EQ(missing.found.front().family, "delay");
+  EXPECT_NEAR(missing.found.front().values.front().value, delay, 0.002);
 }
 
 // Noise that is alike in neighbours may be as large as it likes, but not larger than what is known of it.

@@ -288,6 +288,11 @@ bool is_worse(const Missing& missing) {
 }
 
 bool may_be_applied(const Missing& missing) {
+  if (missing.answer == Answer::parameters_only) {
+    double left = 0.0;  // nothing was added, so the simulation as it was given is what counts
+    for (const Gap& gap : missing.gaps) left += gap.nominal > 0.0 ? std::pow(gap.after / gap.nominal, 2.0) : 1.0;
+    return left <= static_cast<double>(missing.gaps.size());
+  }
   return missing.answer != Answer::nothing_missing && missing.answer != Answer::undecided &&
          missing.answer != Answer::failed_held_out && !is_worse(missing);
 }
