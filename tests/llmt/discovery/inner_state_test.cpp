@@ -205,9 +205,13 @@ TEST(InnerState, ACorrectionThatMakesTheGapLargerIsWorse) {
     for (const auto& [before, after] : gaps) {
       missing.gaps.push_back({.output = "u", .before = before, .after = after, .noise_floor = 0.1});
     }
+    missing.found.resize(1);
     return missing;
   };
-  EXPECT_FALSE(is_worse(missing_with({{0.5, 0.5}})));  // nothing was found
+  EXPECT_FALSE(is_worse(missing_with({{0.5, 0.5}})));
+  Missing nothing = missing_with({{0.5, 0.6}});
+  nothing.found.clear();
+  EXPECT_FALSE(is_worse(nothing));  // there is nothing to leave out
   EXPECT_FALSE(is_worse(missing_with({{0.5, 0.4}})));
   EXPECT_TRUE(is_worse(missing_with({{0.5, 0.6}})));
   EXPECT_TRUE(is_worse(missing_with({{0.0, 0.1}})));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <stdexcept>
 #include <string>
 
 #include "discovery/terms/input_noise.hpp"
@@ -110,6 +111,28 @@ TEST(FilteredRows, AreWeightedSumsThatEndWhereTheRecordingDoes) {
     EXPECT_NEAR(filtered(i, 0), sum / weight, 1e-12) << i;
   }
   EXPECT_EQ(as_measured({{"x"}, inputs.values}, values), values);
+}
+
+TEST(FilteredRows, ThatAreTooFewOrTooFarApartAreRefused) {
+  const Model model;
+  const Rows whole = rows_of_log(1, model, 0.05, [&](double t) { return model.torque(motion(t)); });
+  const auto refusal = [&](Eigen::Index every, Eigen::Index most) {
+    std::vector<Eigen::Index> kept;
+    for (Eigen::Index i = 0; i < whole.simulated.rows() && std::ssize(kept) < most; i += every) kept.push_back(i);
+    Rows rows = whole;
+    rows.inputs.values = whole.inputs.values(kept, Eigen::all);
+    rows.inputs.instants = whole.inputs.instants(kept);
+    rows.simulated = whole.simulated(kept, Eigen::all);
+    rows.measured.values = whole.measured.values(kept, Eigen::all);
+    try {
+      find_missing(tabulated(rows.simulated, {"u"}), rows.inputs, rows.measured, standard_terms(rows.inputs));
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(refusal(10, 200).find("too far to filter the simulation"), std::string::npos);
+  EXPECT_NE(refusal(1, 20).find("longer than the filter"), std::string::npos);
 }
 
 // The integral of a sign over rows is right wherever between two rows the input passes zero.

@@ -282,6 +282,8 @@ bool is_drift(const Missing& missing) {
 }
 
 bool is_worse(const Missing& missing) {
+  // Without terms there is nothing to leave out; rounding and corrected parameters may differ from the fit before.
+  if (missing.found.empty() && missing.answer != Answer::failed_held_out) return false;
   double left = 0.0;
   for (const Gap& gap : missing.gaps) left += gap.after == gap.before ? 1.0 : std::pow(gap.after / gap.before, 2.0);
   return missing.answer == Answer::failed_held_out || left > static_cast<double>(missing.gaps.size());

@@ -310,6 +310,13 @@ RowSplit split_filtered(const Inputs& inputs, const MissingOptions& options) {
     }
     before = &segment;
   }
+  if (split.searched.size() + split.held_out.size() == 0) {
+    refuse(
+        "find_missing",
+        fmt::format("no stretch of rows at even steps of {:.4g} is longer than the filter, which reaches over {:.4g}: "
+                    "rows between were left out, or the record is too short",
+                    filter.step(), filter.step() * static_cast<double>(filter.weights().size())));
+  }
   return split;
 }
 
