@@ -13,20 +13,38 @@ ColumnCache::ColumnCache(const Inputs& inputs) : places_(inputs.values.rows(), -
   for (Eigen::Index i = 0; i < all_.size(); ++i) places_[all_.rows()[i]] = i;
 }
 
-bool ColumnCache::holds(const ModelTerm& term) {
-  return term.constants.empty() && !term.inputs.empty() && !term.code.empty() &&
+namespace {
+
+bool is_of_inputs_alone(const ModelTerm& term) {
+  return !term.inputs.empty() && !term.code.empty() && term.inner_state.empty() &&
          std::ranges::none_of(term.code, [](const std::string& code) { return code.find("$s") != std::string::npos; });
+}
+
+}  // namespace
+
+bool ColumnCache::holds(const ModelTerm& term) { return term.constants.empty() && is_of_inputs_alone(term); }
+
+bool ColumnCache::holds_grid(const ModelTerm& term) { return !term.constants.empty() && is_of_inputs_alone(term); }
+
+Eigen::MatrixXd ColumnCache::of_samples(const Eigen::MatrixXd& all, const Samples& samples) const {
+  std::vector<Eigen::Index> places(samples.size());
+  for (Eigen::Index i = 0; i < samples.size(); ++i) places[i] = places_[samples.rows_of(i).front()];
+  return all(places, Eigen::all);
 }
 
 Eigen::MatrixXd ColumnCache::at(const Samples& samples, std::size_t draw, std::size_t term,
                                 const std::function<Eigen::MatrixXd()>& columns) {
   const auto [place, is_new] = columns_.try_emplace({draw, term});
   if (is_new) place->second = means(columns(), all_);
-  Eigen::MatrixXd values(samples.size(), place->second.cols());
-  for (Eigen::Index i = 0; i < samples.size(); ++i) {
-    values.row(i) = place->second.row(places_[samples.rows_of(i).front()]);
-  }
-  return values;
+  return of_samples(place->second, samples);
+}
+
+Eigen::MatrixXd ColumnCache::grid_at(
+    const Samples& samples, std::size_t term,
+    const std::function<Eigen::MatrixXd(const std::vector<Eigen::Index>&)>& columns) {
+  const auto [place, is_new] = grids_.try_emplace(term);
+  if (is_new) place->second = columns(all_.rows());
+  return of_samples(place->second, samples);
 }
 
 }  // namespace llmt::discovery

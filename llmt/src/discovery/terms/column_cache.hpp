@@ -22,15 +22,26 @@ class ColumnCache {
 
   static bool holds(const ModelTerm& term);
 
+  /// Whether a term with constants is a function of the inputs alone.
+  static bool holds_grid(const ModelTerm& term);
+
   /// samples x k. `draw`: 0 for the inputs as they are, else the number of the draw of their errors. `columns` computes
   /// them at all rows.
   Eigen::MatrixXd at(const Samples& samples, std::size_t draw, std::size_t term,
                      const std::function<Eigen::MatrixXd()>& columns);
 
+  /// samples x m: columns of a term with constants at all values of them that are tried, not filtered. `columns`
+  /// computes them at the rows it is given.
+  Eigen::MatrixXd grid_at(const Samples& samples, std::size_t term,
+                          const std::function<Eigen::MatrixXd(const std::vector<Eigen::Index>&)>& columns);
+
  private:
   Samples all_;
   std::vector<Eigen::Index> places_;  // of each row among them; -1: none
   std::map<std::pair<std::size_t, std::size_t>, Eigen::MatrixXd> columns_;
+  std::map<std::size_t, Eigen::MatrixXd> grids_;
+
+  Eigen::MatrixXd of_samples(const Eigen::MatrixXd& all, const Samples& samples) const;
 };
 
 }  // namespace llmt::discovery

@@ -85,10 +85,7 @@ void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const M
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) start(k) = missing.parameters[k].value;
   MissingOptions nothing_aside = options;
   nothing_aside.held_out_share = 0.0;
-  const bool in_time = inputs.instants.size() > 0;
-  RowSplit split =
-      in_time ? split_in_time(inputs, nothing_aside, rows.fewest_samples) : split_independent(inputs, nothing_aside);
-  if (std::ranges::find(rows.apart, true) != rows.apart.end()) split = without_rows(split, rows.apart);
+  RowSplit split = split_of(inputs, rows, nothing_aside);
   std::vector<PlacedTerm> placed;
   for (const FoundTerm& found : missing.found) {
     placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -40,6 +41,36 @@ class OfRows {
   std::optional<Derivatives> derivatives_;
   Eigen::VectorXd instants_;
   std::vector<Eigen::Index> sequence_;
+};
+
+// Derivatives of the simulation at the inputs that terms are evaluated at: those of the log, and with drawn errors.
+class SlopesOfSimulation {
+ public:
+  explicit SlopesOfSimulation(std::shared_ptr<const Surrogate> surrogate) : surrogate_(std::move(surrogate)) {}
+
+  /// n x d.
+  const Eigen::MatrixXd& at(const Eigen::MatrixXd& inputs, Eigen::Index column) {
+    constexpr std::size_t most = 16;
+    auto known = std::ranges::find_if(known_, [&](const Known& own) {
+      return own.inputs.rows() == inputs.rows() && own.inputs == inputs;
+    });
+    if (known == known_.end()) {
+      if (known_.size() == most) known_.erase(known_.begin());
+      known_.push_back({inputs, {}});
+      known = known_.end() - 1;
+    }
+    const auto [place, is_new] = known->by_column.try_emplace(column);
+    if (is_new) place->second = surrogate_->derivative(inputs, column);
+    return place->second;
+  }
+
+ private:
+  struct Known {
+    Eigen::MatrixXd inputs;
+    std::map<Eigen::Index, Eigen::MatrixXd> by_column;
+  };
+  std::shared_ptr<const Surrogate> surrogate_;
+  std::vector<Known> known_;
 };
 
 // What jumps with the sign of an input has no derivatives. Dry friction is known where the speed is, so it is taken off
@@ -131,7 +162,7 @@ ModelTerm resonance(const std::string& output, std::vector<double> frequencies) 
 }
 
 ModelTerm drive_spring(const std::shared_ptr<OfRows>& of_rows, const std::shared_ptr<const Surrogate>& surrogate,
-                       const Motion& motion, const Inputs& inputs, const std::string& output,
+                       const std::shared_ptr<SlopesOfSimulation>& slopes, const Motion& motion, const Inputs& inputs, const std::string& output,
                        Eigen::Index output_index) {
   const std::string& q = inputs.names[motion.position];
   const std::string& v = inputs.names[motion.speed];
@@ -144,11 +175,10 @@ ModelTerm drive_spring(const std::shared_ptr<OfRows>& of_rows, const std::shared
       output, q, v, a);
   term.inputs = {q, v, a};
   term.coefficients = {"compliance", "inertia", "damping"};
-  term.columns = [of_rows, surrogate, motion, output_index](const Rows& rows, const Eigen::VectorXd&) {
+  term.columns = [of_rows, surrogate, slopes, motion, output_index](const Rows& rows, const Eigen::VectorXd&) {
     const Derivatives& derivatives = of_rows->at(rows, rows.inputs);
-    const Eigen::ArrayXd by_position = surrogate->derivative(rows.inputs, motion.position).col(output_index).array();
-    const Eigen::ArrayXd by_acceleration =
-        surrogate->derivative(rows.inputs, motion.acceleration).col(output_index).array();
+    const Eigen::ArrayXd by_position = slopes->at(rows.inputs, motion.position).col(output_index).array();
+    const Eigen::ArrayXd by_acceleration = slopes->at(rows.inputs, motion.acceleration).col(output_index).array();
     const auto second = [&](const Eigen::ArrayXd& w) -> Eigen::ArrayXd {
       return derivatives.second(w.matrix()).array() / (motion.second * motion.second);
     };
@@ -201,6 +231,7 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
   if (inputs.values.rows() < fewest || !simulated.allFinite()) return terms;
   const auto of_rows = std::make_shared<OfRows>();
   const auto surrogate = std::make_shared<const Surrogate>(inputs.values, simulated);
+  const auto slopes = std::make_shared<SlopesOfSimulation>(surrogate);
   const std::vector<Motion> all = motions(of_rows->at(rows, inputs.values), inputs);
   // Less than this, and the derivatives of the function are not those of the simulation.
   constexpr double described = 0.98;
@@ -234,7 +265,7 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
       continue;
     }
     for (const Motion& motion : all) {
-      terms.push_back(drive_spring(of_rows, surrogate, motion, inputs, outputs[o], place));
+      terms.push_back(drive_spring(of_rows, surrogate, slopes, motion, inputs, outputs[o], place));
       limit(terms.back());
     }
   }

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "discovery/terms/column_cache.hpp"
 #include "discovery/terms/derivatives.hpp"
 #include "discovery/terms/row_filter.hpp"
 #include "llmt/random.hpp"
@@ -108,7 +109,8 @@ struct InputNoise::Draw {
   Inputs inputs;
   Simulation simulation;
   std::unique_ptr<TermModel> model;
-  Eigen::MatrixXd change;  // n x d of the simulation
+  Eigen::MatrixXd change;    // n x d of the simulation
+  Eigen::MatrixXd filtered;  // n x d, `change` through the filter of the log
 };
 
 Eigen::MatrixXd noise_in_time(const Rows& rows, const Inputs& inputs) {
@@ -193,6 +195,7 @@ InputNoise::InputNoise(const TermModel& model, const Inputs& inputs, const Eigen
         draw->inputs.values.col(j) = draw->inputs.values.col(j).cwiseMax(low).cwiseMin(high);
       }
       draw->change = surrogate_.predict(draw->inputs.values) - described;
+      draw->filtered = as_measured(inputs, draw->change);
       draw->simulation.parameters = model.parameters();
       draw->simulation.predict = [base = model_, own = draw.get()](const Eigen::MatrixXd&,
                                                                    const Eigen::VectorXd& values) -> Eigen::MatrixXd {
@@ -207,8 +210,18 @@ InputNoise::InputNoise(const TermModel& model, const Inputs& inputs, const Eigen
 
 Eigen::VectorXd InputNoise::moment_correction(const TermData& data, const PlacedTerm& placed,
                                               const Eigen::MatrixXd& simulated) const {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(std::ssize(model_->terms()[placed.term].coefficients));
+  const ModelTerm& term = model_->terms()[placed.term];
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(std::ssize(term.coefficients));
+  // (K T)'(K y) = T'(K K y) for a filter K that is the same forwards and backwards, so the term is computed at the rows
+  // of the samples alone.
+  const bool at_samples = data.samples.is_filtered() && term.inner_state.empty() && !ColumnCache::holds(term);
   for (const std::shared_ptr<const Draw>& draw : draws_) {
+    if (at_samples) {
+      const Eigen::MatrixXd moved = draw->model->columns_at(placed, simulated + draw->change, data.samples.rows());
+      const Eigen::VectorXd twice = means(draw->filtered.col(placed.output), data.samples);
+      if (moved.allFinite()) sum += moved.transpose() * twice / std::pow(data.sigma(placed.output), 2.0);
+      continue;
+    }
     const Eigen::MatrixXd moved = stacked_signature(*draw->model, data, placed, simulated + draw->change);
     sum += moved.transpose() * stacked(data, draw->change);
   }

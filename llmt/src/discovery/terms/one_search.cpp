@@ -68,18 +68,25 @@ void set_known_noise(const MeasuredOutputs& measured, const ErrorsOfInputs& erro
 
 }  // namespace
 
+RowSplit split_of(const Inputs& inputs, const SearchedRows& searched, const MissingOptions& options) {
+  const bool in_time = inputs.instants.size() > 0;
+  const RowSplit split =
+      in_time ? split_in_time(inputs, options, searched.fewest_samples) : split_independent(inputs, options);
+  const bool has_apart = std::ranges::find(searched.apart, true) != searched.apart.end();
+  return has_apart ? without_rows(split, searched.apart) : split;
+}
+
 Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                     const std::vector<ModelTerm>& terms, const SearchedRows& searched, const MissingOptions& options,
                     const std::set<std::size_t>& refuted) {
   const bool in_time = inputs.instants.size() > 0;
+  if (std::getenv("LLMT_TRACE")) fprintf(stderr, "search\n");
   Simulation distinct = simulation;
   TermModel model(distinct, inputs, measured.names, terms, refuted);
   model.share(searched.columns, 0);
   Eigen::VectorXd start(std::ssize(simulation.parameters));
   for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
-  RowSplit split =
-      in_time ? split_in_time(inputs, options, searched.fewest_samples) : split_independent(inputs, options);
-  if (std::ranges::find(searched.apart, true) != searched.apart.end()) split = without_rows(split, searched.apart);
+  RowSplit split = split_of(inputs, searched, options);
   ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
   const Eigen::Index d = measured.values.cols();
   TermData data = data_of(split.searched, measured);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "discovery/terms/column_cache.hpp"
+#include "discovery/terms/row_split.hpp"
 #include "llmt/discovery/missing.hpp"
 #include "llmt/discovery/model_term.hpp"
 
@@ -17,6 +18,9 @@ struct SearchedRows {
   Eigen::Index fewest_samples = 1000;         ///< that averaging rows in time may leave
   std::shared_ptr<ColumnCache> columns = {};  ///< of filtered rows
 };
+
+/// The rows that are searched and those set aside.
+RowSplit split_of(const Inputs& inputs, const SearchedRows& searched, const MissingOptions& options);
 
 /// Searches all terms but those refuted at all rows but those apart, and judges what it finds on the rows set aside.
 Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,

@@ -7,8 +7,8 @@
 #include <optional>
 #include <stdexcept>
 
-#include "discovery/terms/alternatives.hpp"
 #include "discovery/terms/averaged_rows.hpp"
+#include "discovery/terms/contests.hpp"
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/determined.hpp"
 #include "discovery/terms/final_fit.hpp"
@@ -111,8 +111,8 @@ Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const Measur
 // search, which sets other rows aside. In time, what follows noise that is alike in neighbours lives on few rows: a
 // term must shrink the gap on the rows set aside, of one search or the next.
 Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, const MeasuredOutputs& measured,
-                const std::vector<ModelTerm>& terms, const SearchedRows& rows, MissingOptions options,
-                std::set<std::size_t> refuted, Missing missing, bool with_alternatives) {
+                const std::vector<ModelTerm>& terms, const SearchedRows& rows, MissingOptions& options,
+                std::set<std::size_t>& refuted, Missing missing) {
   const Inputs& inputs = smooth.inputs;
   const bool in_time = inputs.instants.size() > 0;
   const int most = in_time ? 4 : 3;
@@ -129,12 +129,6 @@ Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, cons
                  narrow.contains(found.term);
         });
     if (holds || (trial >= most && beyond.empty() && narrow.empty())) {
-      if (!with_alternatives) return missing;
-      const Alternatives alternatives{simulation, inputs, measured, terms, rows, options, refuted};
-      missing = alternatives.state_for_terms(std::move(missing));
-      missing = alternatives.terms_for_state(std::move(missing));
-      missing = alternatives.causes_for_shapes(std::move(missing));
-      missing = alternatives.plain_for_searched(std::move(missing));
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
       return missing;
     }
@@ -229,34 +223,23 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   for (std::size_t i = 0; i < rows.apart.size(); ++i) rows.apart[i] = rows.apart[i] || smooth.unknown_sign[i];
   const std::vector<std::string> at_limits =
       notes_on_limits(rows_at_limits(measured, as_measured(as_given, simulated), rows.apart));
-  const auto search_without = [&](std::set<std::size_t> refuted, bool with_alternatives = true) {
-    Beginning beginning = begin(there, inputs, measured, terms, rows, options, refuted);
-    // The filter of a recording looks like a state whose constants are not those of a machine.
-    for (auto beyond = beyond_constants(beginning.missing, terms); !beyond.empty();
-         beyond = beyond_constants(beginning.missing, terms)) {
-      refuted.insert(beyond.begin(), beyond.end());
-      beginning = begin(there, inputs, measured, terms, rows, options, refuted);
-    }
-    Missing found = find_at(there, smooth, measured, terms, beginning.rows, options, refuted,
-                            std::move(beginning.missing), with_alternatives);
-    found.notes.insert(found.notes.begin(), beginning.at_reversals.begin(), beginning.at_reversals.end());
-    return std::pair(std::move(found), std::move(beginning.rows));
-  };
-  const std::set<std::size_t> regimes = terms_of_regimes(terms);
-  auto [missing, searched] = search_without(regimes);
-  const bool is_judged = inputs.instants.size() > 0 && !missing.held_out.empty();
-  if (is_judged && has_gain(missing) && missing.answer != Answer::inner_state) {
-    std::set<std::size_t> left_out = shares_of_the_simulation(terms);
-    left_out.insert(regimes.begin(), regimes.end());
-    auto [of_inputs, searched_for_inputs] = search_without(left_out);
-    missing = inputs_for_gain(std::move(missing), std::move(of_inputs), measured, options.search.rival_margin);
-    if (!has_gain(missing)) searched = std::move(searched_for_inputs);
+  std::set<std::size_t> refuted = terms_of_regimes(terms);
+  Beginning beginning = begin(there, inputs, measured, terms, rows, options, refuted);
+  // The filter of a recording looks like a state whose constants are not those of a machine.
+  for (auto beyond = beyond_constants(beginning.missing, terms); !beyond.empty();
+       beyond = beyond_constants(beginning.missing, terms)) {
+    refuted.insert(beyond.begin(), beyond.end());
+    beginning = begin(there, inputs, measured, terms, rows, options, refuted);
   }
-  if (!regimes.empty() && !missing.held_out.empty() && leaves_something(missing)) {
-    auto [of_regimes, searched_for_regimes] = search_without({}, false);
-    missing = regimes_for_unknown(std::move(missing), std::move(of_regimes));
-    const bool has_regime = std::ranges::any_of(missing.found, [](const FoundTerm& f) { return !f.regime.empty(); });
-    if (has_regime) searched = std::move(searched_for_regimes);
+  const SearchedRows& searched = beginning.rows;
+  Missing missing =
+      find_at(there, smooth, measured, terms, searched, options, refuted, std::move(beginning.missing));
+  missing.notes.insert(missing.notes.begin(), beginning.at_reversals.begin(), beginning.at_reversals.end());
+  if (inputs.instants.size() > 0 && !missing.held_out.empty()) {
+    const CrossValidation validation(there, inputs, measured, terms, searched, options);
+    missing = contested(std::move(missing), terms, refuted, validation, [&](const std::set<std::size_t>& left_out) {
+      return search_once(there, inputs, measured, terms, searched, options, left_out);
+    });
   }
   fit_on_all_rows(there, inputs, measured, terms, searched, options, missing);
   missing.zero_bands = inputs.zero_bands;

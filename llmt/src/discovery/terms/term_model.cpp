@@ -92,6 +92,46 @@ bool within_tried(const TermModel& model, const std::vector<PlacedTerm>& before,
   return true;
 }
 
+// Derivatives of the residuals: by coefficients the columns, by constants differences of the term's own columns, by
+// parameters of the simulation differences of everything.
+Eigen::MatrixXd jacobian_of(const TermModel& model, const TermData& data, const Layout& layout,
+                            const std::vector<PlacedTerm>& placed, const Eigen::VectorXd& values) {
+  const double relative_step = std::cbrt(std::numeric_limits<double>::epsilon());
+  const auto own = static_cast<Eigen::Index>(layout.own);
+  const std::vector<PlacedTerm> here = unpack(model, placed, values, layout.own);
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(data.measured.size(), values.size());
+  const auto step_of = [&](Eigen::Index k) {
+    return relative_step * std::max(std::abs(values(k)), layout.parameters[k].scale);
+  };
+  for (Eigen::Index k = 0; k < own; ++k) {
+    if (!layout.parameters[k].free) continue;
+    Eigen::VectorXd moved = values.head(own);
+    moved(k) = values(k) + step_of(k);
+    const double upper = moved(k);
+    const Eigen::VectorXd above = scaled_residuals(model, data, moved, here);
+    moved(k) = values(k) - step_of(k);
+    jacobian.col(k) = (above - scaled_residuals(model, data, moved, here)) / (upper - moved(k));
+  }
+  const Eigen::MatrixXd simulated = model.simulated(values.head(own));
+  Eigen::Index next = own;
+  for (const PlacedTerm& term : here) {
+    const Eigen::Index count = term.coefficients.size();
+    jacobian.middleCols(next, count) = -stacked_signature(model, data, term, simulated);
+    next += count;
+    for (Eigen::Index c = 0; c < term.constants.size(); ++c, ++next) {
+      if (!layout.parameters[next].free) continue;
+      PlacedTerm moved = term;
+      moved.constants(c) = term.constants(c) + step_of(next);
+      const double upper = moved.constants(c);
+      const Eigen::VectorXd above = stacked_signature(model, data, moved, simulated) * term.coefficients;
+      moved.constants(c) = term.constants(c) - step_of(next);
+      const Eigen::VectorXd below = stacked_signature(model, data, moved, simulated) * term.coefficients;
+      jacobian.col(next) = (below - above) / (upper - moved.constants(c));
+    }
+  }
+  return jacobian;
+}
+
 // The factors on standard errors that correlated noise makes. The estimate of parameter j is sum_i z_ij e_i, Z the
 // transposed pseudo-inverse of the Jacobian; its variance is inflated output by output.
 Eigen::VectorXd error_factors(const TermData& data, const LeastSquaresProblem& problem, const SolverResult& result) {
@@ -103,7 +143,7 @@ Eigen::VectorXd error_factors(const TermData& data, const LeastSquaresProblem& p
     if (problem.parameters[k].free) free.push_back(k);
   }
   if (free.empty()) return factors;
-  Eigen::MatrixXd jacobian = difference_jacobian(problem, result.values)(Eigen::all, free);
+  Eigen::MatrixXd jacobian = problem.jacobian(result.values)(Eigen::all, free);
   for (std::size_t j = 0; j < free.size(); ++j) jacobian.col(j) *= problem.parameters[free[j]].scale;
   const Eigen::MatrixXd influences = jacobian.completeOrthogonalDecomposition().pseudoInverse().transpose();
   const Eigen::Index d = data.measured.cols();
@@ -225,7 +265,11 @@ std::string TermModel::label(const PlacedTerm& placed) const {
 
 Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
                                  const std::vector<PlacedTerm>& placed) {
-  const Eigen::MatrixXd predicted = means(model.predict(parameters, placed), data.samples);
+  const Eigen::MatrixXd& simulated = model.simulated(parameters);
+  Eigen::MatrixXd predicted = means(simulated, data.samples);
+  for (const PlacedTerm& term : placed) {
+    predicted.col(term.output) += model.means_of(term, simulated, data.samples) * term.coefficients;
+  }
   const Eigen::Index d = data.measured.cols();
   Eigen::VectorXd residuals(data.measured.size());
   for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
@@ -299,6 +343,7 @@ TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::Vec
     problem.residual = [&](const Eigen::VectorXd& values) {
       return scaled_residuals(model, data, values.head(own), unpack(model, placed, values, layout.own));
     };
+    problem.jacobian = [&](const Eigen::VectorXd& values) { return jacobian_of(model, data, layout, placed, values); };
     SolverResult result = solve(problem);
     if (!data.stretches.empty()) {
       result.standard_errors.array() *= error_factors(data, problem, result).array();

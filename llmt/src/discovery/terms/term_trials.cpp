@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "discovery/search/workspace.hpp"
+#include "discovery/terms/column_cache.hpp"
 #include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
@@ -45,12 +46,44 @@ class Trials {
     placed_.constants = constants;
     const bool is_coarse =
         is_coarse_ && data_->samples.is_filtered() && model_->terms()[placed_.term].inner_state.empty();
-    const Eigen::MatrixXd of_rows = is_coarse ? model_->columns_at(placed_, *simulated_, data_->samples.rows())
-                                              : model_->columns(placed_, *simulated_);
-    Eigen::MatrixXd columns = is_coarse ? of_rows : means(of_rows, data_->samples);
+    if (is_coarse) return gain_of(model_->columns_at(placed_, *simulated_, data_->samples.rows()));
+    const Eigen::MatrixXd of_rows = model_->columns(placed_, *simulated_);
+    const Eigen::MatrixXd columns = means(of_rows, data_->samples);
+    for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+      if (share_kept(of_rows.col(k), columns.col(k), data_->samples) < smallest_share_kept) return 0.0;
+    }
+    return gain_of(columns);
+  }
+
+  /// At all values tried, coarsely: as if nothing had been filtered.
+  std::vector<double> coarse_gains(const std::vector<Eigen::VectorXd>& tried) {
+    std::vector<double> gains;
+    is_coarse_ = true;
+    if (!data_->samples.is_filtered() || model_->shared() == nullptr ||
+        !ColumnCache::holds_grid(model_->terms()[placed_.term])) {
+      for (const Eigen::VectorXd& values : tried) gains.push_back(gain(values));
+      return gains;
+    }
+    const auto columns_of = [&](const std::vector<Eigen::Index>& rows) {
+      const Eigen::Index width = placed_.coefficients.size();
+      Eigen::MatrixXd all(std::ssize(rows), width * std::ssize(tried));
+      for (std::size_t k = 0; k < tried.size(); ++k) {
+        placed_.constants = tried[k];
+        all.middleCols(static_cast<Eigen::Index>(k) * width, width) = model_->columns_at(placed_, *simulated_, rows);
+      }
+      return all;
+    };
+    const Eigen::MatrixXd grid = model_->shared()->grid_at(data_->samples, placed_.term, columns_of);
+    const Eigen::Index width = placed_.coefficients.size();
+    for (std::size_t k = 0; k < tried.size(); ++k) {
+      gains.push_back(gain_of(grid.middleCols(static_cast<Eigen::Index>(k) * width, width)));
+    }
+    return gains;
+  }
+
+  double gain_of(Eigen::MatrixXd columns) const {
     if (!columns.allFinite()) return 0.0;
     for (Eigen::Index k = 0; k < columns.cols(); ++k) {
-      if (!is_coarse && share_kept(of_rows.col(k), columns.col(k), data_->samples) < smallest_share_kept) return 0.0;
       if (carriers(columns.col(k)) < fewest_carriers_) return 0.0;
     }
     if (model_->terms()[placed_.term].whole) {
@@ -71,10 +104,6 @@ class Trials {
   }
 
   double sum_of_squares() const { return residuals_.squaredNorm(); }
-
-  /// Many values are tried at the rows of the samples alone, as if nothing had been filtered; what is best there is
-  /// then tried as it is.
-  void be_coarse(bool is_coarse) { is_coarse_ = is_coarse; }
 
   const PlacedTerm& at(const Eigen::VectorXd& constants) {
     placed_.constants = constants;
@@ -208,9 +237,7 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
                     .coefficients = Eigen::VectorXd::Zero(std::ssize(own.coefficients)),
                     .prior_cost = own.prior_cost + 2.0 * std::log(static_cast<double>(tried.size()))};
   Trials trials(model, data, ground, placed, simulated);
-  std::vector<double> gains;
-  trials.be_coarse(true);
-  for (const Eigen::VectorXd& values : tried) gains.push_back(trials.gain(values));
+  const std::vector<double> gains = trials.coarse_gains(tried);
   std::vector<std::size_t> order(gains.size());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
   std::ranges::stable_sort(order, std::greater<>{}, [&](std::size_t k) { return gains[k]; });
@@ -230,9 +257,7 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
     places.push_back(value);
     Eigen::VectorXd constants = tried[k];
     if (own.regime.empty()) {
-      trials.be_coarse(false);
-      constants = refined(trials, own.constants, constants, trials.gain(constants));
-      trials.be_coarse(true);
+      constants = refined(trials, own.constants, constants, gains[k]);
     } else {
       constants(0) = refined_threshold(trials, constant.tried, constants(0), gains[k]);
     }

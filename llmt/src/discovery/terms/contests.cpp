@@ -1,0 +1,209 @@
+#include "discovery/terms/contests.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "discovery/terms/missing_findings.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+using Terms = std::vector<ModelTerm>;
+using Left = std::set<std::size_t>;
+
+bool is_share_of_the_simulation(const std::string& family) {
+  return family == "gain" || family == "gain_curvature" || family == "load_friction";
+}
+
+bool is_certain(const Missing& missing) {
+  return !missing.found.empty() && std::ranges::all_of(missing.found, &FoundTerm::confirmed);
+}
+
+bool has_shapes(const Missing& missing) { return std::ranges::any_of(missing.found, &FoundTerm::generic); }
+
+Eigen::Index fitted_numbers(const Missing& missing) {
+  Eigen::Index count = 0;
+  for (const FoundTerm& term : missing.found) {
+    count += (term.whole ? 0 : term.coefficients.size()) + term.constants.size() + (term.regime.empty() ? 0 : 1);
+  }
+  return count;
+}
+
+bool has_same_terms(const Missing& a, const Missing& b) {
+  const auto terms = [](const Missing& missing) {
+    std::set<std::pair<std::size_t, Eigen::Index>> all;
+    for (const FoundTerm& found : missing.found) all.insert({found.term, found.output_index});
+    return all;
+  };
+  return terms(a) == terms(b);
+}
+
+// Whether what the answers add is within a tenth the same at all rows.
+bool is_same_function(const Missing& a, const Missing& b) {
+  constexpr double same = 0.1;
+  for (Eigen::Index o = 0; o < a.corrected.cols(); ++o) {
+    const double size = (a.corrected.col(o) - a.before.col(o)).norm();
+    if ((a.corrected.col(o) - b.corrected.col(o)).norm() > same * size) return false;
+  }
+  return true;
+}
+
+// Those terms of `other` that are not among those of `found`, on the output of `term`.
+RivalTerms in_its_place(const FoundTerm& term, const std::vector<FoundTerm>& found, const Missing& other) {
+  RivalTerms rival;
+  for (const FoundTerm& instead : other.found) {
+    const bool is_shared = std::ranges::any_of(found, [&](const FoundTerm& own) {
+      return own.term == instead.term && own.output_index == instead.output_index;
+    });
+    if (is_shared || instead.output_index != term.output_index) continue;
+    rival.what +=
+        (rival.what.empty() ? "" : " + ") + instead.family + (instead.location.empty() ? "" : " " + instead.location);
+    rival.inputs.insert(rival.inputs.end(), instead.inputs.begin(), instead.inputs.end());
+  }
+  return rival;
+}
+
+// `other` as a rival of the terms of `found` that it does without.
+Missing with_rival(Missing found, const Missing& other, bool is_tentative) {
+  const std::vector<FoundTerm> all = found.found;
+  for (FoundTerm& term : found.found) {
+    const bool is_shared = std::ranges::any_of(other.found, [&](const FoundTerm& own) {
+      return own.term == term.term && own.output_index == term.output_index;
+    });
+    if (is_shared) continue;
+    const RivalTerms rival = in_its_place(term, all, other);
+    if (rival.what.empty()) continue;
+    term.rivals.insert(term.rivals.begin(), rival);
+    if (found.answer == Answer::named) found.answer = Answer::indistinguishable;
+    if (is_tentative) term.confirmed = false;
+  }
+  demand_certainty(found);
+  return found;
+}
+
+template <class Test>
+Left with(Left left, const Terms& terms, Test test) {
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (test(terms[t])) left.insert(t);
+  }
+  return left;
+}
+
+// The terms that a contest leaves out, or nothing where it does not apply.
+using LeftOut = std::optional<Left> (*)(const Missing&, const Terms&, const Left& refuted);
+
+std::optional<Left> all_but_states(const Missing& found, const Terms& terms, const Left& refuted) {
+  const auto is_state = [&](std::size_t t) { return !terms[t].inner_state.empty(); };
+  if (found.answer == Answer::inner_state || std::ranges::none_of(refuted, is_state)) return std::nullopt;
+  return with({}, terms, [](const ModelTerm& term) { return term.inner_state.empty(); });
+}
+
+std::optional<Left> states(const Missing& found, const Terms& terms, const Left& refuted) {
+  if (found.answer != Answer::inner_state) return std::nullopt;
+  return with(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); });
+}
+
+std::optional<Left> shapes(const Missing& found, const Terms& terms, const Left& refuted) {
+  if (!has_shapes(found)) return std::nullopt;
+  return with(refuted, terms, [](const ModelTerm& term) { return term.generic; });
+}
+
+std::optional<Left> constants(const Missing& found, const Terms& terms, const Left& refuted) {
+  std::set<std::vector<std::string>> places;
+  for (const FoundTerm& term : found.found) {
+    if (!term.generic && term.constants.size() > 0 && term.inputs.size() == 1) places.insert(term.inputs);
+  }
+  if (places.empty() || found.answer == Answer::inner_state) return std::nullopt;
+  return with(refuted, terms,
+              [&](const ModelTerm& term) { return places.contains(term.inputs) && !term.constants.empty(); });
+}
+
+std::optional<Left> gains(const Missing& found, const Terms& terms, const Left& refuted) {
+  const bool has_gain = std::ranges::any_of(
+      found.found, [](const FoundTerm& term) { return is_share_of_the_simulation(term.family); });
+  if (!has_gain || found.answer == Answer::inner_state) return std::nullopt;
+  return with(refuted, terms, [](const ModelTerm& term) { return is_share_of_the_simulation(term.family); });
+}
+
+std::optional<Left> nothing_but_refuted(const Missing& found, const Terms& terms, const Left& refuted) {
+  const Left regimes = terms_of_regimes(terms);
+  if (regimes.empty() || !leaves_something(found)) return std::nullopt;
+  Left left;
+  std::ranges::set_difference(refuted, regimes, std::inserter(left, left.end()));
+  return left;
+}
+
+struct Contest {
+  const char* name;
+  LeftOut left_out;
+};
+
+// States first, because what stands beside a wrong one explains what it misses; regimes last, because they are tried
+// where everything else leaves something.
+constexpr std::array<Contest, 6> contests = {{{"states alone", all_but_states},
+                                              {"no states", states},
+                                              {"no shapes", shapes},
+                                              {"no searched constants", constants},
+                                              {"no share of the simulation", gains},
+                                              {"regimes", nothing_but_refuted}}};
+
+}  // namespace
+
+std::set<std::size_t> terms_of_regimes(const Terms& terms) {
+  return with({}, terms, [](const ModelTerm& term) { return !term.regime.empty(); });
+}
+
+bool leaves_something(const Missing& missing) {
+  constexpr double alike = 0.5;  // independent share
+  constexpr double as_noise = 2.0;
+  const auto is_noise = [&](const Gap& gap) { return gap.after <= as_noise * gap.known_noise; };
+  if (missing.answer == Answer::inner_state || std::ranges::all_of(missing.gaps, is_noise)) return false;
+  if (missing.time.in_time && missing.time.independent_share < alike) return true;
+  return missing.answer == Answer::unknown || missing.answer == Answer::undecided ||
+         missing.answer == Answer::failed_held_out || !missing.structure.empty();
+}
+
+Missing better_of(Missing found, Missing other, double ratio) {
+  constexpr double margin = 3.0;  // a likelihood 20 times as large
+  const bool may_replace = is_certain(other) || !is_certain(found);
+  if (ratio < -margin) return found;
+  if (ratio > margin) return may_replace ? other : with_rival(std::move(found), other, true);
+  const bool is_tentative = !is_same_function(found, other);
+  const bool is_simpler = fitted_numbers(other) < fitted_numbers(found);
+  return is_simpler && may_replace ? with_rival(std::move(other), found, is_tentative)
+                                   : with_rival(std::move(found), other, is_tentative);
+}
+
+Missing contested(Missing found, const Terms& terms, const Left& refuted, const CrossValidation& validation,
+                  const std::function<Missing(const Left&)>& search) {
+  const char* skip = std::getenv("LLMT_SKIP");
+  for (const Contest& contest : contests) {
+    if (skip && std::string(skip).find(contest.name) != std::string::npos) continue;
+    const std::optional<Left> left_out = contest.left_out(found, terms, refuted);
+    if (!left_out) continue;
+    Missing other = search(*left_out);
+    const bool competes = other.answer != Answer::failed_held_out && !other.found.empty() &&
+                          beyond_constants(other, terms).empty() && !(has_shapes(other) && !has_shapes(found)) &&
+                          !has_same_terms(found, other);
+    if (!competes) continue;
+    Eigen::VectorXd floors(std::ssize(found.gaps));
+    for (std::size_t o = 0; o < found.gaps.size(); ++o) {
+      floors(static_cast<Eigen::Index>(o)) = std::max(found.gaps[o].noise_floor, other.gaps[o].noise_floor);
+    }
+    const double share = std::max(found.time.independent_share, other.time.independent_share);
+    const double ratio = log_likelihood_ratio(validation.errors(found), validation.errors(other), floors, share);
+    if (std::getenv("LLMT_TRACE")) {
+      auto say = [](const Missing& m) { std::string t; for (const auto& f : m.found) t += f.family + " " + f.location + (f.confirmed ? "+ " : "? "); return t; };
+      fprintf(stderr, "contest %s: ratio %.3g share %.3g/%.3g same %d | %s(%ld) | %s(%ld)\n", contest.name, ratio, found.time.independent_share, other.time.independent_share, is_same_function(found, other), say(found).c_str(), fitted_numbers(found), say(other).c_str(), fitted_numbers(other));
+    }
+    found = better_of(std::move(found), std::move(other), ratio);
+  }
+  return found;
+}
+
+}  // namespace llmt::discovery

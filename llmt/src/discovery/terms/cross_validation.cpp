@@ -1,0 +1,87 @@
+#include "discovery/terms/cross_validation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "discovery/terms/row_filter.hpp"
+#include "discovery/terms/row_split.hpp"
+#include "discovery/terms/term_question.hpp"
+
+namespace llmt::discovery {
+
+CrossValidation::CrossValidation(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                                 const std::vector<ModelTerm>& terms, const SearchedRows& rows,
+                                 const MissingOptions& options)
+    : simulation_(&simulation),
+      inputs_(&inputs),
+      terms_(&terms),
+      outputs_(measured.names),
+      columns_(rows.columns) {
+  MissingOptions nothing_aside = options;
+  nothing_aside.held_out_share = 0.0;
+  const RowSplit split = split_of(inputs, rows, nothing_aside);
+  data_ = {.samples = split.searched,
+           .measured = means_of_filtered(measured.values, split.searched),
+           .sigma = Eigen::VectorXd::Ones(measured.values.cols()),
+           .stretches = {}};
+}
+
+Eigen::MatrixXd CrossValidation::errors(const Missing& answer) const {
+  constexpr Eigen::Index folds = 5;
+  constexpr Eigen::Index stretches = 2 * folds;
+  Simulation simulation = *simulation_;
+  simulation.parameters = answer.parameters;
+  TermModel model(simulation, *inputs_, outputs_, *terms_);
+  model.share(columns_, 0);
+  Eigen::VectorXd start(std::ssize(answer.parameters));
+  for (std::size_t k = 0; k < answer.parameters.size(); ++k) start(k) = answer.parameters[k].value;
+  std::vector<PlacedTerm> placed;
+  for (const FoundTerm& found : answer.found) {
+    placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
+  }
+  TermData data = data_;
+  for (std::size_t o = 0; o < answer.gaps.size(); ++o) {
+    if (answer.gaps[o].noise_floor > 0.0) data.sigma(static_cast<Eigen::Index>(o)) = answer.gaps[o].noise_floor;
+  }
+  const Eigen::Index n = data.samples.size();
+  Eigen::MatrixXd errors(n, data.measured.cols());
+  for (Eigen::Index fold = 0; fold < folds; ++fold) {
+    std::vector<std::size_t> left_out;
+    std::vector<std::size_t> used;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      (i * stretches / n % folds == fold ? left_out : used).push_back(static_cast<std::size_t>(i));
+    }
+    if (left_out.empty()) continue;
+    const TermData fitted = without_samples(data, left_out);
+    std::vector<PlacedTerm> own = placed;
+    hold(model, fitted, start, own);
+    const TermFit fit = fit_terms(model, fitted, start, own);
+    const TermData unused = without_samples(data, used);
+    const Eigen::VectorXd stacked = scaled_residuals(model, unused, fit.parameters, fit.placed);
+    const Eigen::Index d = data.measured.cols();
+    for (std::size_t k = 0; k < left_out.size(); ++k) {
+      errors.row(static_cast<Eigen::Index>(left_out[k])) =
+          stacked.segment(static_cast<Eigen::Index>(k) * d, d).cwiseProduct(data.sigma).transpose();
+    }
+  }
+  return errors;
+}
+
+double log_likelihood_ratio(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
+                            double independent_share) {
+  constexpr double far = 5.0;
+  double ratio = 0.0;
+  for (Eigen::Index o = 0; o < found.cols(); ++o) {
+    const Eigen::ArrayXd own = found.col(o).cwiseAbs();
+    const Eigen::ArrayXd others = other.col(o).cwiseAbs();
+    const Eigen::ArrayXd counts = (own.min(others) <= far * floors(o)).cast<double>();
+    const double smallest = std::numeric_limits<double>::min();
+    const double left = (counts * own.square()).sum() + smallest;
+    const double left_by_other = (counts * others.square()).sum() + smallest;
+    ratio += 0.5 * independent_share * counts.sum() * std::log(left / left_by_other);
+  }
+  return ratio;
+}
+
+}  // namespace llmt::discovery
