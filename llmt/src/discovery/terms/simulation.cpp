@@ -217,8 +217,10 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
     };
   }
   smooth.inputs = with_zero_bands(there, std::move(smooth.inputs), measured);
+  SearchedRows rows{.apart = rows_at_rest(smooth.inputs)};
+  const std::vector<std::string> at_rest = notes_on_rest(smooth.inputs);
+  smooth.inputs.zero_bands = bands_of_errors(smooth.inputs);
   const Inputs& inputs = smooth.inputs;
-  SearchedRows rows{.apart = rows_at_rest(inputs)};
   if (inputs.cutoff > 0.0) rows.columns = std::make_shared<ColumnCache>(inputs);
   for (std::size_t i = 0; i < rows.apart.size(); ++i) rows.apart[i] = rows.apart[i] || smooth.unknown_sign[i];
   const std::vector<std::string> at_limits =
@@ -234,7 +236,6 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   const SearchedRows& searched = beginning.rows;
   Missing missing =
       find_at(there, smooth, measured, terms, searched, options, refuted, std::move(beginning.missing));
-  missing.notes.insert(missing.notes.begin(), beginning.at_reversals.begin(), beginning.at_reversals.end());
   if (inputs.instants.size() > 0 && !missing.held_out.empty()) {
     const CrossValidation validation(there, inputs, measured, terms, searched, options);
     missing = contested(std::move(missing), terms, refuted, validation, [&](const std::set<std::size_t>& left_out) {
@@ -248,7 +249,7 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
     missing.corrected = as_measured(as_given, corrected(simulation, missing, terms, as_given));
     missing.change_by_smoothing = smooth.change;
   }
-  const std::vector<std::string> at_rest = notes_on_rest(inputs);
+  missing.notes.insert(missing.notes.begin(), beginning.at_reversals.begin(), beginning.at_reversals.end());
   missing.notes.insert(missing.notes.begin(), at_rest.begin(), at_rest.end());
   missing.notes.insert(missing.notes.begin(), at_limits.begin(), at_limits.end());
   missing.notes.insert(missing.notes.begin(), smooth.notes.begin(), smooth.notes.end());

@@ -174,14 +174,25 @@ std::vector<UnknownSign> rows_of_unknown_sign(const Rows& rows, const Inputs& in
   return found;
 }
 
+Eigen::VectorXd bands_of_errors(const Inputs& inputs) {
+  constexpr double far = 4.0;  // standard deviations: farther out a machine that creeps moves
+  Eigen::VectorXd bands = inputs.zero_bands;
+  if (!(inputs.cutoff > 0.0) || inputs.noise.size() == 0) return bands;
+  for (Eigen::Index j = 0; j < bands.size(); ++j) {
+    if (inputs.noise(j) >= 0.0) bands(j) = std::min(bands(j), far * inputs.noise(j));
+  }
+  return bands;
+}
+
 std::vector<std::string> notes_on_rest(const Inputs& inputs) {
   std::vector<std::string> notes;
   for (Eigen::Index j = 0; j < inputs.zero_bands.size(); ++j) {
     if (!(inputs.zero_bands(j) > 0.0)) continue;
     notes.push_back(fmt::format(
         "{0} rests at {1} rows, with |{0}| < {2:.3g}. They were set apart, because dry friction at rest may be "
-        "anything up to that of motion. The terms found take {0} for 0 there",
-        inputs.names[j], (inputs.values.col(j).array().abs() < inputs.zero_bands(j)).count(), inputs.zero_bands(j)));
+        "anything up to that of motion. The terms found take {0} for 0 where |{0}| < {3:.3g}",
+        inputs.names[j], (inputs.values.col(j).array().abs() < inputs.zero_bands(j)).count(), inputs.zero_bands(j),
+        bands_of_errors(inputs)(j)));
   }
   return notes;
 }

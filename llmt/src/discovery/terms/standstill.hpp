@@ -34,6 +34,10 @@ Eigen::VectorXd zero_bands(const Inputs& inputs, const Eigen::MatrixXd& deviatio
 /// Marks the rows at which an input is within its band.
 std::vector<bool> rows_at_rest(const Inputs& inputs);
 
+/// Within these, terms take an input for 0: the zero bands, but in filtered rows with known noise no wider than 4
+/// standard deviations. Rows of a machine that creeps are set apart beside those at which it sticks, but it moves.
+Eigen::VectorXd bands_of_errors(const Inputs& inputs);
+
 std::vector<std::string> notes_on_rest(const Inputs& inputs);
 
 /// The split without the rows set apart. A sample keeps those of its rows that are left, if half of them are.
