@@ -63,7 +63,7 @@ std::string place_without_regime(const std::string& location) {
 Json regime_json(const discovery::FoundTerm& found) {
   if (found.regime.empty()) return nullptr;
   return {{"input", found.regime},
-          {"threshold", found.constants(0)},
+          {"threshold", found.constants(found.constants.size() - 1)},
           {"acts", found.location.ends_with("> c") ? "above" : "below"}};
 }
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "discovery/search/replacements.hpp"
-#include "discovery/terms/alternatives.hpp"
 #include "discovery/terms/approximations.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "llmt/discovery/simulation.hpp"
@@ -147,48 +146,6 @@ TEST(Answers, ASearchedTermWhoseSizeIsNotKnownToAQuarterIsTentative) {
   EXPECT_TRUE(is_confirmed(0.15, true));
   EXPECT_FALSE(is_confirmed(0.16, true));
   EXPECT_TRUE(is_confirmed(0.16, false));
-}
-
-// Rows 0 to 99, of which half were set aside; each term leaves `error` everywhere.
-Missing leaving(double error, std::vector<FoundTerm> found) {
-  Missing missing = answer_with(std::move(found));
-  missing.corrected = Eigen::MatrixXd::Constant(100, 1, -error);
-  for (Eigen::Index row = 0; row < 50; ++row) missing.held_out.push_back(row);
-  missing.gaps = {{.output = "y", .before = 10.0, .after = error, .noise_floor = 1.0}};
-  for (FoundTerm& term : missing.found) term.confirmed = true;
-  return missing;
-}
-
-TEST(Answers, TermsOfInputsThatLeaveAsLittleAreRivalsOfAGain) {
-  const MeasuredOutputs measured{{"y"}, Eigen::MatrixXd::Zero(100, 1)};
-  const FoundTerm gain = found_term(0, "gain", "", 0.2, 0.01);
-  const FoundTerm drag = found_term(1, "signed_square", "v", 1.5, 0.01);
-  const FoundTerm inertia = found_term(2, "linear", "a", 0.5, 0.01);
-  const FoundTerm friction = found_term(3, "linear", "v", 0.4, 0.01);
-  const Missing found = leaving(1.0, {gain, drag});
-  // 50 rows: 1.21 of the squares are a logarithm of the likelihood of 5.25, 1.44 of them 11.
-  const Missing rival = inputs_for_gain(found, leaving(1.1, {inertia, friction, drag}), measured, 6.0);
-  ASSERT_EQ(rival.found.size(), 2u);
-  ASSERT_EQ(rival.found[0].rivals.size(), 1u);
-  EXPECT_EQ(rival.found[0].rivals[0].what, "linear a + linear v");
-  EXPECT_EQ(rival.answer, Answer::indistinguishable);
-  EXPECT_TRUE(inputs_for_gain(found, leaving(1.2, {inertia, friction, drag}), measured, 6.0).found[0].rivals.empty());
-
-  // Nothing is as good as an answer without an error.
-  EXPECT_EQ(inputs_for_gain(leaving(0.0, {gain, drag}), leaving(1.0, {inertia}), measured, 6.0).found[0].family,
-            "gain");
-
-  // With fewer terms they are the answer, unless it is uncertain.
-  EXPECT_EQ(inputs_for_gain(found, leaving(1.1, {inertia}), measured, 6.0).found[0].family, "linear");
-  EXPECT_EQ(inputs_for_gain(found, leaving(1.2, {inertia}), measured, 6.0).found[0].family, "gain");
-  Missing uncertain = leaving(1.1, {inertia});
-  uncertain.answer = Answer::unknown;
-  const Missing doubted = inputs_for_gain(found, uncertain, measured, 6.0);
-  EXPECT_EQ(doubted.found[0].family, "gain");
-  EXPECT_FALSE(doubted.found[0].confirmed);
-  EXPECT_EQ(doubted.answer, Answer::unknown);
-  EXPECT_TRUE(has_gain(answer_with({found_term(0, "load_friction", "v", 0.2, 0.01)})));
-  EXPECT_FALSE(has_gain(answer_with({drag})));
 }
 
 TEST(Answers, OneHingeStandsForAHingeAtTheOtherSideWithALineAndAnOffset) {

@@ -49,14 +49,14 @@ struct ModelTerm {
   std::string per = {};  ///< a coefficient is in units of the output by this, "a^2"; empty: in those of the output
   /// n x k. Called as Simulation::predict is.
   std::function<Eigen::MatrixXd(const Rows& rows, const Eigen::VectorXd& constants)> columns;
-  std::vector<TermConstant> constants = {};  ///< at most two; of two, both smooth
+  std::vector<TermConstant> constants = {};  ///< at most two; of two, the first is smooth
   std::string output = {};                   ///< the output it changes; empty: each output is a place of its own
   bool generic = false;  ///< not a cause but a shape: what it explains is "unknown, depends on `inputs`"
   bool history = false;  ///< depends on earlier rows: tried only beside what rows explain by themselves
   /// "a delay or a first-order lag": the term stands for a state that the inputs do not show. Empty: it does not.
   std::string inner_state = {};
   std::string shown_by = {};  ///< the signal that would show that state
-  /// The input beyond whose threshold the term acts, and is zero elsewhere. Tried only where the other terms leave
+  /// The input beyond whose threshold, the last constant, the term acts, and is zero elsewhere. Tried only where the other terms leave
   /// something. Empty: it acts everywhere.
   std::string regime = {};
   std::string unit = {};       ///< of the first coefficient; empty: that of the output by `per`, of all

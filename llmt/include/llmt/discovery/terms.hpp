@@ -70,8 +70,8 @@ std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string&
 std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::MatrixXd& simulated,
                                          const std::vector<std::string>& outputs);
 
-/// Effects that act in a regime alone: each term of `library` of at most the complexity of a product, without a
-/// constant of its own, times [x > c] or [x <= c] for every input x; the threshold c is searched, first among 20
+/// Effects that act in a regime alone: each term of `library` with at most one constant of its own (none, where it is
+/// a function of x), times [x > c] or [x <= c] for every input x; the threshold c is searched, first among 20
 /// quantiles. Location: "q where x > c".
 std::vector<ModelTerm> regime_terms(const Inputs& inputs, const std::vector<ModelTerm>& library);
 

@@ -1,6 +1,7 @@
 #include "discovery/terms/column_cache.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "discovery/terms/row_split.hpp"
 
@@ -40,9 +41,11 @@ Eigen::MatrixXd ColumnCache::at(const Samples& samples, std::size_t draw, std::s
 }
 
 Eigen::MatrixXd ColumnCache::grid_at(
-    const Samples& samples, std::size_t term,
+    const Samples& samples, std::size_t term, const std::vector<Eigen::VectorXd>& tried,
     const std::function<Eigen::MatrixXd(const std::vector<Eigen::Index>&)>& columns) {
-  const auto [place, is_new] = grids_.try_emplace(term);
+  std::vector<double> values;
+  for (const Eigen::VectorXd& constants : tried) values.insert(values.end(), constants.begin(), constants.end());
+  const auto [place, is_new] = grids_.try_emplace({term, std::move(values)});
   if (is_new) place->second = columns(all_.rows());
   return of_samples(place->second, samples);
 }

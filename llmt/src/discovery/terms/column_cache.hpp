@@ -32,14 +32,14 @@ class ColumnCache {
 
   /// samples x m: columns of a term with constants at all values of them that are tried, not filtered. `columns`
   /// computes them at the rows it is given.
-  Eigen::MatrixXd grid_at(const Samples& samples, std::size_t term,
+  Eigen::MatrixXd grid_at(const Samples& samples, std::size_t term, const std::vector<Eigen::VectorXd>& tried,
                           const std::function<Eigen::MatrixXd(const std::vector<Eigen::Index>&)>& columns);
 
  private:
   Samples all_;
   std::vector<Eigen::Index> places_;  // of each row among them; -1: none
   std::map<std::pair<std::size_t, std::size_t>, Eigen::MatrixXd> columns_;
-  std::map<std::size_t, Eigen::MatrixXd> grids_;
+  std::map<std::pair<std::size_t, std::vector<double>>, Eigen::MatrixXd> grids_;
 
   Eigen::MatrixXd of_samples(const Eigen::MatrixXd& all, const Samples& samples) const;
 };

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -94,63 +96,104 @@ Left with(Left left, const Terms& terms, Test test) {
   return left;
 }
 
-// The terms that a contest leaves out, or nothing where it does not apply.
-using LeftOut = std::optional<Left> (*)(const Missing&, const Terms&, const Left& refuted);
+// What a contest searches, but for the terms left out.
+struct Others {
+  Terms terms;
+  Left left_out;
+};
 
-std::optional<Left> all_but_states(const Missing& found, const Terms& terms, const Left& refuted) {
+// Nothing where the contest does not apply.
+using OthersOf = std::optional<Others> (*)(const Missing&, const Terms&, const Left& refuted);
+
+std::optional<Others> all_but_states(const Missing& found, const Terms& terms, const Left& refuted) {
   const auto is_state = [&](std::size_t t) { return !terms[t].inner_state.empty(); };
   if (found.answer == Answer::inner_state || std::ranges::none_of(refuted, is_state)) return std::nullopt;
-  return with({}, terms, [](const ModelTerm& term) { return term.inner_state.empty(); });
+  return Others{terms, with({}, terms, [](const ModelTerm& term) { return term.inner_state.empty(); })};
 }
 
-std::optional<Left> states(const Missing& found, const Terms& terms, const Left& refuted) {
+std::optional<Others> states(const Missing& found, const Terms& terms, const Left& refuted) {
   if (found.answer != Answer::inner_state) return std::nullopt;
-  return with(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); });
+  return Others{terms, with(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); })};
 }
 
-std::optional<Left> shapes(const Missing& found, const Terms& terms, const Left& refuted) {
+std::optional<Others> shapes(const Missing& found, const Terms& terms, const Left& refuted) {
   if (!has_shapes(found)) return std::nullopt;
-  return with(refuted, terms, [](const ModelTerm& term) { return term.generic; });
+  return Others{terms, with(refuted, terms, [](const ModelTerm& term) { return term.generic; })};
 }
 
-std::optional<Left> constants(const Missing& found, const Terms& terms, const Left& refuted) {
+std::optional<Others> constants(const Missing& found, const Terms& terms, const Left& refuted) {
   std::set<std::vector<std::string>> places;
   for (const FoundTerm& term : found.found) {
     if (!term.generic && term.constants.size() > 0 && term.inputs.size() == 1) places.insert(term.inputs);
   }
   if (places.empty() || found.answer == Answer::inner_state) return std::nullopt;
-  return with(refuted, terms,
-              [&](const ModelTerm& term) { return places.contains(term.inputs) && !term.constants.empty(); });
+  return Others{terms, with(refuted, terms, [&](const ModelTerm& term) {
+                  return places.contains(term.inputs) && !term.constants.empty();
+                })};
 }
 
-std::optional<Left> gains(const Missing& found, const Terms& terms, const Left& refuted) {
+std::optional<Others> gains(const Missing& found, const Terms& terms, const Left& refuted) {
   const bool has_gain = std::ranges::any_of(
       found.found, [](const FoundTerm& term) { return is_share_of_the_simulation(term.family); });
   if (!has_gain || found.answer == Answer::inner_state) return std::nullopt;
-  return with(refuted, terms, [](const ModelTerm& term) { return is_share_of_the_simulation(term.family); });
+  return Others{terms,
+                with(refuted, terms, [](const ModelTerm& term) { return is_share_of_the_simulation(term.family); })};
 }
 
-std::optional<Left> nothing_but_refuted(const Missing& found, const Terms& terms, const Left& refuted) {
+Left without(const Left& left, const Left& others) {
+  Left rest;
+  std::ranges::set_difference(left, others, std::inserter(rest, rest.end()));
+  return rest;
+}
+
+// Terms without constants find the input and the threshold.
+std::optional<Others> plain_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
   const Left regimes = terms_of_regimes(terms);
-  if (regimes.empty() || !leaves_something(found)) return std::nullopt;
-  Left left;
-  std::ranges::set_difference(refuted, regimes, std::inserter(left, left.end()));
-  return left;
+  // Several terms may imitate one that acts in a part.
+  if (regimes.empty() || !(leaves_something(found) || found.found.size() > 1)) return std::nullopt;
+  return Others{terms, with(without(refuted, regimes), terms, [](const ModelTerm& term) {
+                  return !term.regime.empty() && term.constants.size() > 1;
+                })};
+}
+
+// "where x > c".
+std::string gate_of(const std::string& location) { return location.substr(location.find("where ")); }
+
+// All terms, beyond the thresholds that were found.
+std::optional<Others> same_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
+  std::map<std::string, std::set<double>> thresholds;
+  for (const FoundTerm& term : found.found) {
+    if (term.regime.empty()) continue;
+    thresholds[gate_of(term.location)].insert(term.constants(term.constants.size() - 1));
+  }
+  if (thresholds.empty()) return std::nullopt;
+  Others others{terms, without(refuted, terms_of_regimes(terms))};
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (terms[t].regime.empty()) continue;
+    const auto own = thresholds.find(gate_of(terms[t].location));
+    if (own == thresholds.end()) {
+      others.left_out.insert(t);
+    } else {
+      others.terms[t].constants.back().tried.assign(own->second.begin(), own->second.end());
+    }
+  }
+  return others;
 }
 
 struct Contest {
   const char* name;
-  LeftOut left_out;
+  OthersOf others;
 };
 
 // States first, because what stands beside a wrong one explains what it misses; regimes last, because they are tried
 // where everything else leaves something.
-constexpr std::array<Contest, 6> contests = {{{"states alone", all_but_states},
+constexpr std::array<Contest, 7> contests = {{{"states alone", all_but_states},
                                               {"no states", states},
                                               {"no shapes", shapes},
                                               {"no searched constants", constants},
                                               {"no share of the simulation", gains},
-                                              {"regimes", nothing_but_refuted}}};
+                                              {"regimes", plain_regimes},
+                                              {"terms of these regimes", same_regimes}}};
 
 }  // namespace
 
@@ -180,13 +223,13 @@ Missing better_of(Missing found, Missing other, double ratio) {
 }
 
 Missing contested(Missing found, const Terms& terms, const Left& refuted, const CrossValidation& validation,
-                  const std::function<Missing(const Left&)>& search) {
+                  const std::function<Missing(const Terms&, const Left&)>& search) {
   const char* skip = std::getenv("LLMT_SKIP");
   for (const Contest& contest : contests) {
     if (skip && std::string(skip).find(contest.name) != std::string::npos) continue;
-    const std::optional<Left> left_out = contest.left_out(found, terms, refuted);
-    if (!left_out) continue;
-    Missing other = search(*left_out);
+    const std::optional<Others> others = contest.others(found, terms, refuted);
+    if (!others) continue;
+    Missing other = search(others->terms, others->left_out);
     const bool competes = other.answer != Answer::failed_held_out && !other.found.empty() &&
                           beyond_constants(other, terms).empty() && !(has_shapes(other) && !has_shapes(found)) &&
                           !has_same_terms(found, other);

@@ -22,9 +22,9 @@ std::set<std::size_t> terms_of_regimes(const std::vector<ModelTerm>& terms);
 Missing better_of(Missing found, Missing other, double ratio);
 
 /// Runs every contest that applies, in the order of a table: what was found against the answer of a search among other
-/// terms. `search`: of all terms but those in the set. `refuted`: terms that are no candidates.
+/// terms. `search`: of the terms given, but for those in the set. `refuted`: terms that are no candidates.
 Missing contested(Missing found, const std::vector<ModelTerm>& terms, const std::set<std::size_t>& refuted,
                   const CrossValidation& validation,
-                  const std::function<Missing(const std::set<std::size_t>&)>& search);
+                  const std::function<Missing(const std::vector<ModelTerm>&, const std::set<std::size_t>&)>& search);
 
 }  // namespace llmt::discovery

@@ -32,20 +32,26 @@ std::vector<double> quantiles(const Inputs& inputs, Eigen::Index column) {
 ModelTerm in_regime(const ModelTerm& term, const std::string& gate, Eigen::Index column, std::vector<double> tried,
                     bool above) {
   const char* sign = above ? ">" : "<=";
+  const char* symbol = term.constants.empty() ? "c" : "d";
   ModelTerm own = term;
   own.location += fmt::format("{}where {} {} c", own.location.empty() ? "" : " ", gate, sign);
-  own.formula = fmt::format("({}) [{} {} c]", term.formula, gate, sign);
+  own.formula = fmt::format("({}) [{} {} {}]", term.formula, gate, sign, symbol);
   own.regime = gate;
   auto place = std::ranges::find(own.inputs, gate);
   if (place == own.inputs.end()) place = own.inputs.insert(place, gate);
   const auto number = place - own.inputs.begin() + 1;
-  for (std::string& code : own.code) code = fmt::format("({})*(${} {} $c)", code, number, sign);
-  own.constants = {{.name = "c", .unit = gate, .tried = std::move(tried), .smooth = false}};
+  for (std::string& code : own.code) code = fmt::format("({})*(${} {} ${})", code, number, sign, symbol);
+  for (TermConstant& constant : own.constants) constant.kept = constant.most = 1;
+  own.constants.push_back({.name = term.constants.empty() ? "c" : "threshold",
+                           .unit = gate,
+                           .tried = std::move(tried),
+                           .smooth = false});
   own.columns = [columns = term.columns, column, above](const Rows& rows, const Eigen::VectorXd& constants) {
-    Eigen::MatrixXd values = columns(rows, {});
+    const Eigen::Index last = constants.size() - 1;
+    Eigen::MatrixXd values = columns(rows, constants.head(last));
     const Eigen::ArrayXd gates = rows.inputs.col(column).array();
     for (Eigen::Index i = 0; i < values.rows(); ++i) {
-      if ((gates(i) > constants(0)) != above) values.row(i).setZero();
+      if ((gates(i) > constants(last)) != above) values.row(i).setZero();
     }
     return values;
   };
@@ -57,7 +63,6 @@ ModelTerm in_regime(const ModelTerm& term, const std::string& gate, Eigen::Index
 }  // namespace
 
 std::vector<ModelTerm> regime_terms(const Inputs& inputs, const std::vector<ModelTerm>& library) {
-  constexpr int a_product = 6;
   constexpr std::size_t fewest = 4;
   std::vector<ModelTerm> terms;
   for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
@@ -65,9 +70,10 @@ std::vector<ModelTerm> regime_terms(const Inputs& inputs, const std::vector<Mode
     const std::vector<double> tried = quantiles(inputs, j);
     if (tried.size() < fewest) continue;
     for (const ModelTerm& term : library) {
-      const bool is_plain = term.constants.empty() && !term.generic && !term.history && term.inner_state.empty();
-      // An offset beyond a threshold is the term step.
-      if (!is_plain || term.complexity > a_product || term.family == "offset" || term.code.empty()) continue;
+      const bool is_cause = !term.generic && !term.history && term.inner_state.empty() && !term.code.empty();
+      const bool is_own = std::ranges::find(term.inputs, inputs.names[j]) != term.inputs.end();
+      // An offset beyond a threshold is the term step, and one constant is that of the term.
+      if (!is_cause || term.family == "offset" || term.constants.size() > (is_own ? 0 : 1)) continue;
       for (const bool above : {true, false}) terms.push_back(in_regime(term, inputs.names[j], j, tried, above));
     }
   }

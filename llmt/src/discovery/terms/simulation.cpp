@@ -238,9 +238,10 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
       find_at(there, smooth, measured, terms, searched, options, refuted, std::move(beginning.missing));
   if (inputs.instants.size() > 0 && !missing.held_out.empty()) {
     const CrossValidation validation(there, inputs, measured, terms, searched, options);
-    missing = contested(std::move(missing), terms, refuted, validation, [&](const std::set<std::size_t>& left_out) {
-      return search_once(there, inputs, measured, terms, searched, options, left_out);
-    });
+    const auto search = [&](const std::vector<ModelTerm>& others, const std::set<std::size_t>& left_out) {
+      return search_once(there, inputs, measured, others, searched, options, left_out);
+    };
+    missing = contested(std::move(missing), terms, refuted, validation, search);
   }
   fit_on_all_rows(there, inputs, measured, terms, searched, options, missing);
   missing.zero_bands = inputs.zero_bands;

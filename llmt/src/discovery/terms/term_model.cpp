@@ -30,8 +30,6 @@ struct Layout {
   std::size_t own = 0;
 };
 
-bool constant_is_fitted(const ModelTerm& term) { return !term.constants.empty() && term.constants.front().smooth; }
-
 Layout layout_of(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
                  const std::vector<PlacedTerm>& placed, bool constants_are_free) {
   Layout layout{model.parameters(), model.parameters().size()};
@@ -55,7 +53,7 @@ Layout layout_of(const TermModel& model, const TermData& data, const Eigen::Vect
       parameter.name = fmt::format("term{}.constant{}", t, c);
       parameter.value = placed[t].constants(c);
       parameter.scale = 0.1 * spacing(term.constants[c].tried, parameter.value);
-      parameter.free = constants_are_free && constant_is_fitted(term);
+      parameter.free = constants_are_free && term.constants[c].smooth;
       layout.parameters.push_back(std::move(parameter));
     }
   }

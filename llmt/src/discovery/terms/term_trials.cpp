@@ -73,7 +73,7 @@ class Trials {
       }
       return all;
     };
-    const Eigen::MatrixXd grid = model_->shared()->grid_at(data_->samples, placed_.term, columns_of);
+    const Eigen::MatrixXd grid = model_->shared()->grid_at(data_->samples, placed_.term, tried, columns_of);
     const Eigen::Index width = placed_.coefficients.size();
     for (std::size_t k = 0; k < tried.size(); ++k) {
       gains.push_back(gain_of(grid.middleCols(static_cast<Eigen::Index>(k) * width, width)));
@@ -145,11 +145,11 @@ std::vector<Eigen::VectorXd> combinations(const std::vector<TermConstant>& const
 // Halving steps between the neighbours of the values tried; of two constants in turn.
 Eigen::VectorXd refined(Trials& trials, const std::vector<TermConstant>& constants, Eigen::VectorXd values,
                         double gain) {
-  if (!constants.front().smooth) return values;
   const int sweeps = constants.size() > 1 ? 3 : 1;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     for (Eigen::Index c = 0; c < values.size(); ++c) {
       const std::vector<double>& tried = constants[c].tried;
+      if (!constants[c].smooth) continue;
       const double step = spacing(tried, values(c));
       for (double width = 0.5 * step; width > 0.01 * step; width *= 0.5) {
         const double centre = values(c);
@@ -256,9 +256,9 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
     if (std::ranges::any_of(places, [&](double place) { return near(value, place); })) continue;
     places.push_back(value);
     Eigen::VectorXd constants = tried[k];
-    if (own.regime.empty()) {
+    if (constant.smooth) {
       constants = refined(trials, own.constants, constants, gains[k]);
-    } else {
+    } else if (!own.regime.empty() && own.constants.size() == 1 && constant.tried.size() > 1) {
       constants(0) = refined_threshold(trials, constant.tried, constants(0), gains[k]);
     }
     best.push_back(trials.at(constants));
