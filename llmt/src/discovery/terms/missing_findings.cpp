@@ -290,13 +290,21 @@ bool is_worse(const Missing& missing) {
 }
 
 bool may_be_applied(const Missing& missing) {
-  if (missing.answer == Answer::parameters_only) {
-    double left = 0.0;  // nothing was added, so the simulation as it was given is what counts
-    for (const Gap& gap : missing.gaps) left += gap.nominal > 0.0 ? std::pow(gap.after / gap.nominal, 2.0) : 1.0;
-    return left <= static_cast<double>(missing.gaps.size());
+  const auto outputs = static_cast<double>(missing.gaps.size());
+  double left = 0.0;
+  for (const Gap& gap : missing.gaps) left += gap.nominal > 0.0 ? std::pow(gap.after / gap.nominal, 2.0) : 1.0;
+  switch (missing.answer) {
+    case Answer::nothing_missing:
+    case Answer::failed_held_out:
+      return false;
+    case Answer::parameters_only:  // nothing was added, so the simulation as it was given is what counts
+      return left <= outputs;
+    case Answer::unknown:
+    case Answer::undecided:
+      return !is_worse(missing) && !(2.0 * left > outputs);
+    default:
+      return !is_worse(missing);
   }
-  return missing.answer != Answer::nothing_missing && missing.answer != Answer::undecided &&
-         missing.answer != Answer::failed_held_out && !is_worse(missing);
 }
 
 Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,
