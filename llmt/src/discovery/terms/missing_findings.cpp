@@ -217,6 +217,14 @@ void demand_certainty(Missing& missing) {
   if (is_named && !std::ranges::all_of(missing.found, &FoundTerm::confirmed)) missing.answer = Answer::unknown;
 }
 
+void confirm_together(Missing& missing) {
+  std::set<Eigen::Index> doubtful;
+  for (const FoundTerm& found : missing.found) {
+    if (!found.confirmed) doubtful.insert(found.output_index);
+  }
+  for (FoundTerm& found : missing.found) found.confirmed = !doubtful.contains(found.output_index);
+}
+
 void bound_by_noise(Missing& missing) {
   constexpr double far = 5.0;
   const bool is_clear = missing.answer == Answer::nothing_missing || missing.answer == Answer::parameters_only;

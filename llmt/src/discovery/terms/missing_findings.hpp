@@ -53,6 +53,9 @@ void bound_by_noise(Missing& missing);
 /// What is named is certain: with a term that is not confirmed the answer is "unknown".
 void demand_certainty(Missing& missing);
 
+/// The terms of an output are confirmed together: beside one that is tentative, another may stand for a part of it.
+void confirm_together(Missing& missing);
+
 /// The indices in `terms` of those terms of a state that were found with a frequency at an end of those tried, or with
 /// a damping ratio that is not below the largest tried by two standard errors: a filter, no machine, has such
 /// constants.

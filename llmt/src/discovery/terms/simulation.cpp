@@ -242,6 +242,7 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
       return search_once(there, inputs, measured, others, searched, options, left_out);
     };
     missing = contested(std::move(missing), terms, refuted, validation, search);
+    confirm_together(missing);
   }
   fit_on_all_rows(there, inputs, measured, terms, searched, options, missing);
   missing.zero_bands = inputs.zero_bands;

@@ -225,9 +225,11 @@ bool retry_constants(const TermModel& model, const TermData& data, TermFit& fit)
 void set_trial_errors(const TermModel& model, const TermData& data, TermFit& fit) {
   for (std::size_t t = 0; t < fit.placed.size(); ++t) {
     const PlacedTerm& placed = fit.placed[t];
-    if (placed.constants.size() == 0 || model.terms()[placed.term].constants.front().smooth) continue;
-    fit.errors[t](placed.coefficients.size()) =
-        trial_error(model, data, ground_without(model, data, fit, t), placed, model.simulated(fit.parameters));
+    for (Eigen::Index c = 0; c < placed.constants.size(); ++c) {
+      if (model.terms()[placed.term].constants[static_cast<std::size_t>(c)].smooth) continue;
+      fit.errors[t](placed.coefficients.size() + c) =
+          trial_error(model, data, ground_without(model, data, fit, t), placed, c, model.simulated(fit.parameters));
+    }
   }
 }
 

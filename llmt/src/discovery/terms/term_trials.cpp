@@ -206,11 +206,15 @@ double spacing(const std::vector<double>& tried, double value) {
 }
 
 double trial_error(const TermModel& model, const TermData& data, const TrialGround& ground, const PlacedTerm& placed,
-                   const Eigen::MatrixXd& simulated) {
-  const std::vector<double>& tried = model.terms()[placed.term].constants.front().tried;
+                   Eigen::Index constant, const Eigen::MatrixXd& simulated) {
+  const std::vector<double>& tried = model.terms()[placed.term].constants[static_cast<std::size_t>(constant)].tried;
   Trials trials(model, data, ground, placed, simulated);
-  const double value = placed.constants(0);
-  const auto gain = [&](double constant) { return trials.gain(Eigen::VectorXd::Constant(1, constant)); };
+  const double value = placed.constants(constant);
+  const auto gain = [&](double other) {
+    Eigen::VectorXd moved = placed.constants;
+    moved(constant) = other;
+    return trials.gain(moved);
+  };
   const double best = gain(value);
   const double variance = std::max(0.0, trials.sum_of_squares() - best) / static_cast<double>(data.samples.size());
   const auto place = static_cast<Eigen::Index>(std::ranges::lower_bound(tried, value) - tried.begin());
