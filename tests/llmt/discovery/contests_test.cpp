@@ -155,20 +155,21 @@ TEST(Contests, FewerNumbersHaveTheNameWhereRowsCannotTell) {
 std::vector<std::string> left_out_for(const Log& log, const Missing& found, const std::set<std::size_t>& refuted = {}) {
   const CrossValidation validation(log.simulation, log.inputs, log.measured, log.terms, {.fewest_samples = rows}, {});
   std::vector<std::string> all;
-  contested(found, log.terms, refuted, validation, [&](const std::vector<ModelTerm>&, const std::set<std::size_t>& left_out) {
-    std::string families;
-    for (const std::string family : {"delay", "linear", "saturation", "gain", "square"}) {
-      const auto place = std::ranges::find_if(
-          log.terms, [&](const ModelTerm& term) { return term.family == family && term.regime.empty(); });
-      if (left_out.contains(static_cast<std::size_t>(place - log.terms.begin()))) families += family + " ";
-    }
-    const auto generic = std::ranges::find_if(log.terms, &ModelTerm::generic);
-    const auto regime = std::ranges::find_if(log.terms, [](const ModelTerm& term) { return !term.regime.empty(); });
-    if (left_out.contains(static_cast<std::size_t>(generic - log.terms.begin()))) families += "shapes ";
-    if (left_out.contains(static_cast<std::size_t>(regime - log.terms.begin()))) families += "regimes ";
-    all.push_back(families);
-    return found;  // the same terms are no rival
-  });
+  contested(
+      found, log.terms, refuted, validation, [&](const std::vector<ModelTerm>&, const std::set<std::size_t>& left_out) {
+        std::string families;
+        for (const std::string family : {"delay", "linear", "saturation", "gain", "square"}) {
+          const auto place = std::ranges::find_if(
+              log.terms, [&](const ModelTerm& term) { return term.family == family && term.regime.empty(); });
+          if (left_out.contains(static_cast<std::size_t>(place - log.terms.begin()))) families += family + " ";
+        }
+        const auto generic = std::ranges::find_if(log.terms, &ModelTerm::generic);
+        const auto regime = std::ranges::find_if(log.terms, [](const ModelTerm& term) { return !term.regime.empty(); });
+        if (left_out.contains(static_cast<std::size_t>(generic - log.terms.begin()))) families += "shapes ";
+        if (left_out.contains(static_cast<std::size_t>(regime - log.terms.begin()))) families += "regimes ";
+        all.push_back(families);
+        return found;  // the same terms are no rival
+      });
   return all;
 }
 

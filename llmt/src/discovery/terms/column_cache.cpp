@@ -40,9 +40,9 @@ Eigen::MatrixXd ColumnCache::at(const Samples& samples, std::size_t draw, std::s
   return of_samples(place->second, samples);
 }
 
-Eigen::MatrixXd ColumnCache::grid_at(
-    const Samples& samples, std::size_t term, const std::vector<Eigen::VectorXd>& tried,
-    const std::function<Eigen::MatrixXd(const std::vector<Eigen::Index>&)>& columns) {
+Eigen::MatrixXd ColumnCache::grid_at(const Samples& samples, std::size_t term,
+                                     const std::vector<Eigen::VectorXd>& tried,
+                                     const std::function<Eigen::MatrixXd(const std::vector<Eigen::Index>&)>& columns) {
   std::vector<double> values;
   for (const Eigen::VectorXd& constants : tried) values.insert(values.end(), constants.begin(), constants.end());
   const auto [place, is_new] = grids_.try_emplace({term, std::move(values)});

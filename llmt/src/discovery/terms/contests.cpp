@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -133,8 +132,8 @@ std::optional<Others> constants(const Missing& found, const Terms& terms, const 
 }
 
 std::optional<Others> gains(const Missing& found, const Terms& terms, const Left& refuted) {
-  const bool has_gain = std::ranges::any_of(
-      found.found, [](const FoundTerm& term) { return is_share_of_the_simulation(term.family); });
+  const bool has_gain =
+      std::ranges::any_of(found.found, [](const FoundTerm& term) { return is_share_of_the_simulation(term.family); });
   if (!has_gain || found.answer == Answer::inner_state) return std::nullopt;
   return Others{terms,
                 with(refuted, terms, [](const ModelTerm& term) { return is_share_of_the_simulation(term.family); })};
@@ -151,9 +150,8 @@ std::optional<Others> plain_regimes(const Missing& found, const Terms& terms, co
   const Left regimes = terms_of_regimes(terms);
   // Several terms may imitate one that acts in a part.
   if (regimes.empty() || !(leaves_something(found) || found.found.size() > 1)) return std::nullopt;
-  return Others{terms, with(without(refuted, regimes), terms, [](const ModelTerm& term) {
-                  return !term.regime.empty() && term.constants.size() > 1;
-                })};
+  return Others{terms, with(without(refuted, regimes), terms,
+                            [](const ModelTerm& term) { return !term.regime.empty() && term.constants.size() > 1; })};
 }
 
 // "where x > c".
@@ -224,9 +222,7 @@ Missing better_of(Missing found, Missing other, double ratio) {
 
 Missing contested(Missing found, const Terms& terms, const Left& refuted, const CrossValidation& validation,
                   const std::function<Missing(const Terms&, const Left&)>& search) {
-  const char* skip = std::getenv("LLMT_SKIP");
   for (const Contest& contest : contests) {
-    if (skip && std::string(skip).find(contest.name) != std::string::npos) continue;
     const std::optional<Others> others = contest.others(found, terms, refuted);
     if (!others) continue;
     Missing other = search(others->terms, others->left_out);
@@ -240,10 +236,6 @@ Missing contested(Missing found, const Terms& terms, const Left& refuted, const 
     }
     const double share = std::max(found.time.independent_share, other.time.independent_share);
     const double ratio = log_likelihood_ratio(validation.errors(found), validation.errors(other), floors, share);
-    if (std::getenv("LLMT_TRACE")) {
-      auto say = [](const Missing& m) { std::string t; for (const auto& f : m.found) t += f.family + " " + f.location + (f.confirmed ? "+ " : "? "); return t; };
-      fprintf(stderr, "contest %s: ratio %.3g share %.3g/%.3g same %d | %s(%ld) | %s(%ld)\n", contest.name, ratio, found.time.independent_share, other.time.independent_share, is_same_function(found, other), say(found).c_str(), fitted_numbers(found), say(other).c_str(), fitted_numbers(other));
-    }
     found = better_of(std::move(found), std::move(other), ratio);
   }
   return found;

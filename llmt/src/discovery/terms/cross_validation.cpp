@@ -13,11 +13,7 @@ namespace llmt::discovery {
 CrossValidation::CrossValidation(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                                  const std::vector<ModelTerm>& terms, const SearchedRows& rows,
                                  const MissingOptions& options)
-    : simulation_(&simulation),
-      inputs_(&inputs),
-      terms_(&terms),
-      outputs_(measured.names),
-      columns_(rows.columns) {
+    : simulation_(&simulation), inputs_(&inputs), terms_(&terms), outputs_(measured.names), columns_(rows.columns) {
   MissingOptions nothing_aside = options;
   nothing_aside.held_out_share = 0.0;
   const RowSplit split = split_of(inputs, rows, nothing_aside);

@@ -91,7 +91,6 @@ void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const M
     placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
   }
   const std::optional<RowSplit> fitting = without_outliers(model, measured, missing, start, placed, split);
-  if (std::getenv("LLMT_TRACE")) { fprintf(stderr, "final fit: %ld of %ld samples\n", fitting ? fitting->searched.size() : -1, split.searched.size()); for (auto& f : missing.parameters) fprintf(stderr, " %s=%.5g", f.name.c_str(), f.value); fprintf(stderr, "\n"); }
   if (!fitting) return;
   split = *fitting;
   ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);

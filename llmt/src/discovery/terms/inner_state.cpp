@@ -51,9 +51,8 @@ class SlopesOfSimulation {
   /// n x d.
   const Eigen::MatrixXd& at(const Eigen::MatrixXd& inputs, Eigen::Index column) {
     constexpr std::size_t most = 16;
-    auto known = std::ranges::find_if(known_, [&](const Known& own) {
-      return own.inputs.rows() == inputs.rows() && own.inputs == inputs;
-    });
+    auto known = std::ranges::find_if(
+        known_, [&](const Known& own) { return own.inputs.rows() == inputs.rows() && own.inputs == inputs; });
     if (known == known_.end()) {
       if (known_.size() == most) known_.erase(known_.begin());
       known_.push_back({inputs, {}});
@@ -162,8 +161,8 @@ ModelTerm resonance(const std::string& output, std::vector<double> frequencies) 
 }
 
 ModelTerm drive_spring(const std::shared_ptr<OfRows>& of_rows, const std::shared_ptr<const Surrogate>& surrogate,
-                       const std::shared_ptr<SlopesOfSimulation>& slopes, const Motion& motion, const Inputs& inputs, const std::string& output,
-                       Eigen::Index output_index) {
+                       const std::shared_ptr<SlopesOfSimulation>& slopes, const Motion& motion, const Inputs& inputs,
+                       const std::string& output, Eigen::Index output_index) {
   const std::string& q = inputs.names[motion.position];
   const std::string& v = inputs.names[motion.speed];
   const std::string& a = inputs.names[motion.acceleration];

@@ -80,7 +80,6 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
                     const std::vector<ModelTerm>& terms, const SearchedRows& searched, const MissingOptions& options,
                     const std::set<std::size_t>& refuted) {
   const bool in_time = inputs.instants.size() > 0;
-  if (std::getenv("LLMT_TRACE")) fprintf(stderr, "search\n");
   Simulation distinct = simulation;
   TermModel model(distinct, inputs, measured.names, terms, refuted);
   model.share(searched.columns, 0);

@@ -42,10 +42,8 @@ ModelTerm in_regime(const ModelTerm& term, const std::string& gate, Eigen::Index
   const auto number = place - own.inputs.begin() + 1;
   for (std::string& code : own.code) code = fmt::format("({})*(${} {} ${})", code, number, sign, symbol);
   for (TermConstant& constant : own.constants) constant.kept = constant.most = 1;
-  own.constants.push_back({.name = term.constants.empty() ? "c" : "threshold",
-                           .unit = gate,
-                           .tried = std::move(tried),
-                           .smooth = false});
+  own.constants.push_back(
+      {.name = term.constants.empty() ? "c" : "threshold", .unit = gate, .tried = std::move(tried), .smooth = false});
   own.columns = [columns = term.columns, column, above](const Rows& rows, const Eigen::VectorXd& constants) {
     const Eigen::Index last = constants.size() - 1;
     Eigen::MatrixXd values = columns(rows, constants.head(last));

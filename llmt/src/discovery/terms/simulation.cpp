@@ -234,8 +234,7 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
     beginning = begin(there, inputs, measured, terms, rows, options, refuted);
   }
   const SearchedRows& searched = beginning.rows;
-  Missing missing =
-      find_at(there, smooth, measured, terms, searched, options, refuted, std::move(beginning.missing));
+  Missing missing = find_at(there, smooth, measured, terms, searched, options, refuted, std::move(beginning.missing));
   if (inputs.instants.size() > 0 && !missing.held_out.empty()) {
     const CrossValidation validation(there, inputs, measured, terms, searched, options);
     const auto search = [&](const std::vector<ModelTerm>& others, const std::set<std::size_t>& left_out) {

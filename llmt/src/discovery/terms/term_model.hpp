@@ -136,8 +136,8 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
                                        std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
                                        const std::vector<PlacedTerm>& taken);
 
-/// Distance from a constant, of this number, to the next value tried at which the sum of squares is larger by more than the variance of
-/// what is left.
+/// Distance from a constant, of this number, to the next value tried at which the sum of squares is larger by more than
+/// the variance of what is left.
 double trial_error(const TermModel& model, const TermData& data, const TrialGround& ground, const PlacedTerm& placed,
                    Eigen::Index constant, const Eigen::MatrixXd& simulated);
 
