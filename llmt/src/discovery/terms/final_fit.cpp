@@ -6,6 +6,7 @@
 
 #include "discovery/terms/errors_of_inputs.hpp"
 #include "discovery/terms/fitted_parameters.hpp"
+#include "discovery/terms/groups.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/row_filter.hpp"
 #include "discovery/terms/row_split.hpp"
@@ -85,6 +86,7 @@ void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const M
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) start(k) = missing.parameters[k].value;
   MissingOptions nothing_aside = options;
   nothing_aside.held_out_share = 0.0;
+  const bool in_time = inputs.instants.size() > 0;
   RowSplit split = split_of(inputs, rows, nothing_aside);
   std::vector<PlacedTerm> placed;
   for (const FoundTerm& found : missing.found) {
@@ -105,6 +107,8 @@ void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const M
   if (retry_constants(model, data, fit)) fit = fit_terms(model, data, fit.parameters, fit.placed);
   const TermFit alone = fit_terms(model, data, start, {});
   set_trial_errors(model, data, fit);
+  const bool is_certain = missing.answer == Answer::named || missing.answer == Answer::indistinguishable;
+  if (in_time && is_certain) name_groups(model, data, fit, missing);
   correct_estimates(errors, data, fit);
   for (std::size_t k = 0; k < missing.found.size(); ++k) set_estimates(fit.placed[k], fit.errors[k], missing.found[k]);
   move_parameters(fit, alone, options.search.false_alarm_rate, missing);

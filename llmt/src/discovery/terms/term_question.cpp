@@ -70,19 +70,6 @@ Eigen::MatrixXd beside(const Eigen::MatrixXd& left, const Eigen::MatrixXd& right
   return both;
 }
 
-// The residuals without term t of the fit, and everything else that may explain them.
-TrialGround ground_without(const TermModel& model, const TermData& data, const TermFit& fit, std::size_t t) {
-  const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
-  const PlacedTerm& placed = fit.placed[t];
-  TrialGround ground{scaled_residuals(model, data, fit.parameters, fit.placed),
-                     baseline_jacobian(model, data, fit.parameters, fit.placed)};
-  ground.residuals += stacked_signature(model, data, placed, simulated) * placed.coefficients;
-  for (std::size_t k = 0; k < fit.placed.size(); ++k) {
-    if (k != t) ground.nuisance = beside(ground.nuisance, stacked_signature(model, data, fit.placed[k], simulated));
-  }
-  return ground;
-}
-
 // In time, the constants of a simpler rival are those with which it stands best in the place of a term of the same
 // inputs: beside that term it would only follow the noise. Independent rows find rivals in the first round.
 class Rivals {
@@ -124,6 +111,18 @@ class Rivals {
 };
 
 }  // namespace
+
+TrialGround ground_without(const TermModel& model, const TermData& data, const TermFit& fit, std::size_t t) {
+  const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
+  const PlacedTerm& placed = fit.placed[t];
+  TrialGround ground{scaled_residuals(model, data, fit.parameters, fit.placed),
+                     baseline_jacobian(model, data, fit.parameters, fit.placed)};
+  ground.residuals += stacked_signature(model, data, placed, simulated) * placed.coefficients;
+  for (std::size_t k = 0; k < fit.placed.size(); ++k) {
+    if (k != t) ground.nuisance = beside(ground.nuisance, stacked_signature(model, data, fit.placed[k], simulated));
+  }
+  return ground;
+}
 
 TermData without_samples(const TermData& data, const std::vector<std::size_t>& left_out) {
   std::vector<Eigen::Index> kept;

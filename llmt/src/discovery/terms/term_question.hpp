@@ -11,6 +11,9 @@ namespace llmt::discovery {
 
 TermData without_samples(const TermData& data, const std::vector<std::size_t>& left_out);
 
+/// The residuals without term t of the fit, and everything else that may explain them.
+TrialGround ground_without(const TermModel& model, const TermData& data, const TermFit& fit, std::size_t t);
+
 struct TermQuestion {
   Evidence evidence;
   std::vector<PlacedTerm> options;  // one for each candidate
