@@ -13,7 +13,8 @@
 namespace llmt::discovery {
 namespace {
 
-constexpr double absorbed = 1e-9;
+constexpr double absorbed = 1e-3;  // as in hold()
+constexpr double rank_tolerance = 1e-9;
 
 // What a term explains of the residuals beyond the nuisance, and what is left then.
 struct InPlace {
@@ -23,9 +24,10 @@ struct InPlace {
   double numbers = 0.0;
 };
 
-class Place {
+class Ground {
  public:
-  explicit Place(TrialGround ground) : basis_(range_basis(ground.nuisance, absorbed)), ground_(std::move(ground)) {
+  explicit Ground(TrialGround ground)
+      : basis_(range_basis(ground.nuisance, rank_tolerance)), ground_(std::move(ground)) {
     residuals_ = ground_.residuals - basis_ * (basis_.transpose() * ground_.residuals);
   }
 
@@ -34,9 +36,13 @@ class Place {
   InPlace with(const TermModel& model, const TermData& data, PlacedTerm placed,
                const Eigen::MatrixXd& simulated) const {
     Eigen::MatrixXd columns = stacked_signature(model, data, placed, simulated);
-    const auto numbers = static_cast<double>(columns.cols() + placed.constants.size());
+    const Eigen::RowVectorXd norms = columns.colwise().norm();
     columns -= basis_ * (basis_.transpose() * columns);
-    const Eigen::MatrixXd range = range_basis(columns, absorbed);
+    for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+      if (columns.col(c).norm() < absorbed * norms(c)) columns.col(c).setZero();
+    }
+    const Eigen::MatrixXd range = range_basis(columns, rank_tolerance);
+    const auto numbers = static_cast<double>(range.cols() + placed.constants.size());
     Eigen::VectorXd function = range * (range.transpose() * residuals_);
     const double left = (residuals_ - function).squaredNorm();
     return {std::move(placed), std::move(function), left, numbers};
@@ -74,12 +80,13 @@ std::string where(const TermModel& model, const ModelTerm& own, const ModelTerm&
 void name_groups(const TermModel& model, const TermData& data, const TermFit& fit, Missing& missing) {
   constexpr double margin = 3.0;  // as in contests
   constexpr double same = 0.1;
+  constexpr double hardly = 0.02;
   const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
   const double samples = data.independent_share * static_cast<double>(data.samples.size());
   for (std::size_t k = 0; k < fit.placed.size(); ++k) {
     const ModelTerm& own_term = model.terms()[fit.placed[k].term];
     if (!may_stand_for_another(own_term)) continue;
-    const Place place(ground_without(model, data, fit, k));
+    const Ground place(ground_without(model, data, fit, k));
     const InPlace own = place.with(model, data, fit.placed[k], simulated);
     FoundTerm& found = missing.found[k];
     const Eigen::Index output = fit.placed[k].output;
@@ -99,14 +106,15 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
         const InPlace other = place.with(model, data, std::move(option), simulated);
         const double evidence =
             0.5 * samples * std::log(other.left / own.left) + 0.5 * (other.numbers - own.numbers) * std::log(samples);
-        if (!(evidence <= margin)) continue;
+        const double difference = (other.function - own.function).norm() / own.function.norm();
+        const bool contains_it = other.numbers > own.numbers && difference < hardly;
+        if (!(evidence <= margin) || contains_it) continue;
         const auto is_named = [&](const RivalTerms& rival) {
           return rival.what == name_of(term) || rival.what.starts_with(name_of(term) + " (");  // with its constant
         };
         if (std::ranges::none_of(found.rivals, is_named)) {
           found.rivals.push_back({.what = name_of(term), .inputs = term.inputs, .exact = false});
         }
-        const double difference = (other.function - own.function).norm() / own.function.norm();
         if (difference > farthest) {
           farthest = difference;
           differing = other;
