@@ -167,8 +167,9 @@ def expression_of(name, x, values):
 class Found:
     """A result with given terms, as apply() reads one."""
 
-    def __init__(self, *terms, verdict="named", parameters=(), **marks):
-        self.terms, self.verdict, self.parameters, self.marks = terms, verdict, parameters, marks
+    def __init__(self, *terms, verdict="named", may_be_applied=True, parameters=(), **marks):
+        self.terms, self.parameters, self.marks = terms, parameters, marks
+        self.answer = {"verdict": verdict, "may_be_applied": may_be_applied}
 
     def to_dict(self):
         effects = [
@@ -186,7 +187,7 @@ class Found:
         ]
         inputs = [{"name": name, "word": name, "low": -1.0, "high": 1.0} for name in ("x", "dx", "ddx")]
         columns = {"inputs": inputs, "outputs": [{"name": "u", "word": "u"}], "order": "", "unknown_all": []}
-        return {"verdict": self.verdict, "parameters": self.parameters, "effects": effects} | columns
+        return self.answer | {"parameters": self.parameters, "effects": effects} | columns
 
 
 def test_terms_of_the_own_motion_become_fields():
@@ -251,8 +252,10 @@ def test_what_the_answer_does_not_stand_for_stays_as_it_was():
     cart = mujoco.MjSpec.from_string(CART)
     heavier = {"parameters": [{"name": "mass cart", "value": 3.01, "change": 0.01}]}
     for verdict in ("nothing missing", "undecided", "failed on held-out rows"):
-        fixed, callback = lm.apply(Found(("cube", "dx", 0.4), verdict=verdict, **heavier), cart)
+        fixed, callback = lm.apply(Found(("cube", "dx", 0.4), verdict=verdict, may_be_applied=False, **heavier), cart)
         assert callback is None and fixed.body("cart").mass == 3.0
+    fixed, _ = lm.apply(Found(verdict="undecided", **heavier), cart)
+    assert fixed.body("cart").mass == 3.01
     delay = Found(("delay", "", 0.01), verdict="an inner state", inner_state="a delay", **heavier)
     with pytest.warns(UserWarning, match=r"nothing is changed: .* inner state delay of the output"):
         fixed, callback = lm.apply(delay, cart)

@@ -19,9 +19,6 @@ Force = Callable[[float], float]
 Law = Callable[[np.ndarray, np.ndarray], float]  # of all positions and velocities
 
 
-_NOTHING = ("nothing missing", "undecided", "failed on held-out rows")
-
-
 class _Correction:
     """What is added to a model while it runs: forces, and friction that depends on the velocity."""
 
@@ -68,8 +65,9 @@ def apply(found: Findings, spec: Any) -> tuple[Any, Callable[[Any, Any], None] |
     positions and velocities become forces. ``callback(model, data)`` is to be called before each ``mj_step``, after
     ``qfrc_applied`` has been set. What MuJoCo cannot take (gains, shapes without a name, other terms of accelerations)
     is left out with a warning that names it, and so is a term that did not shrink the gap on the rows set aside; if
-    parameters were fitted beside it, nothing is changed. The specification is copied as it is, too, where nothing is
-    missing, and where the answer is undecided or an inner state: what stands beside a state was fitted with it.
+    parameters were fitted beside it, nothing is changed. The specification is copied as it is, too, where the result
+    says that it may not be applied (``may_be_applied``), and where the answer is an inner state: what stands beside a
+    state was fitted with it.
     """
     answer = found.to_dict()
     positions = _positions(column["name"] for column in answer["inputs"])
@@ -83,7 +81,7 @@ def apply(found: Findings, spec: Any) -> tuple[Any, Callable[[Any, Any], None] |
     states = [_title(term) for term in answer["effects"] if "inner_state" in term]
     if states:
         warnings.warn(f"nothing is changed: MuJoCo cannot take the inner state {'; '.join(states)}", stacklevel=2)
-    if states or not answer.get("may_be_applied", True) or answer["verdict"] in _NOTHING:
+    if states or not answer["may_be_applied"]:
         return fixed, None
     joints = {joint.name: joint for joint in fixed.joints}
     spec_joints = [
