@@ -2,12 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <span>
 #include <string>
 #include <utility>
 
 #include "discovery/search/replacements.hpp"
-#include "discovery/terms/approximations.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "search_cases.hpp"
@@ -64,53 +62,6 @@ TEST(Answers, ATermForWhichAnOffsetCouldStandCountsAsOneBesideAPower) {
   EXPECT_FALSE(power_and_saturation({{"offset", {}, false}, {"linear T", {"T"}, false}}));
 }
 
-TEST(Answers, ATermIsTentativeIfTheIntervalOfItsCoefficientReachesZero) {
-  const auto is_confirmed = [](double standard_error) {
-    Missing missing = answer_with({found_term(0, "cube", "a", -1.0, standard_error)});
-    decide(missing, true);
-    return missing.found[0].confirmed;
-  };
-  EXPECT_TRUE(is_confirmed(0.5));
-  EXPECT_FALSE(is_confirmed(0.52));
-}
-
-TEST(Answers, TermsOfOneInputThatNearlyCancelAreTentative) {
-  const auto is_confirmed = [](bool cancels) {
-    Missing missing = answer_with({found_term(0, "sign", "v", 1.3, 0.01), found_term(1, "tanh", "v", -1.3, 0.01)});
-    decide(missing, true, {cancels, cancels});
-    EXPECT_EQ(missing.notes.empty(), missing.found[0].confirmed);
-    return missing.found[0].confirmed && missing.found[1].confirmed;
-  };
-  EXPECT_TRUE(is_confirmed(false));
-  EXPECT_FALSE(is_confirmed(true));
-}
-
-TEST(Answers, ASignAndATanhOfTheOtherSignNearlyCancel) {
-  constexpr Eigen::Index n = 201;
-  const Inputs inputs{{"v"}, Eigen::VectorXd::LinSpaced(n, -1.0, 1.0)};
-  const Simulation simulation = tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"});
-  const std::vector<ModelTerm> terms = standard_terms(inputs);
-  const TermModel model(simulation, inputs, {"y"}, terms);
-  Samples samples;
-  for (Eigen::Index i = 0; i < n; ++i) samples.add(std::span(&i, 1));
-  const TermData data{
-      .samples = samples, .measured = Eigen::MatrixXd::Zero(n, 1), .sigma = Eigen::VectorXd::Ones(1), .stretches = {}};
-  const auto placed = [&](const std::string& family, double value, double width) {
-    const auto own = std::ranges::find(terms, family, &ModelTerm::family) - terms.begin();
-    FoundTerm term = found_term(static_cast<std::size_t>(own), family, "v", value, 0.01);
-    term.constants = Eigen::VectorXd::Constant(std::ssize(terms[own].constants), width);
-    return term;
-  };
-  const Eigen::VectorXd nominal = Eigen::Vector2d(0.0, 1.0);
-  const auto cancels = [&](const std::vector<FoundTerm>& found) {
-    return cancelling_terms(model, data, nominal, found);
-  };
-  // 1 - tanh(v / 0.1) has a mean square of about 0.04, 1 + tanh(v / 0.1) one of nearly 4.
-  EXPECT_EQ(cancels({placed("sign", 1.0, 0.0), placed("tanh", -1.0, 0.1)}), (std::vector<bool>{true, true}));
-  EXPECT_EQ(cancels({placed("sign", 1.0, 0.0), placed("tanh", 1.0, 0.1)}), (std::vector<bool>{false, false}));
-  EXPECT_EQ(cancels({placed("tanh", 1.0, 0.1)}), (std::vector<bool>{false}));
-}
-
 TEST(Answers, AWidthIsNotBelowTheErrorsOfItsInput) {
   constexpr Eigen::Index n = 1000;
   const Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(n, -1.0, 1.0);
@@ -129,23 +80,6 @@ TEST(Answers, AWidthIsNotBelowTheErrorsOfItsInput) {
   EXPECT_FALSE(is_too_narrow(0.041, 0.0));
   EXPECT_TRUE(is_too_narrow(0.041, 0.021));
   EXPECT_FALSE(is_too_narrow(0.041, 0.02));
-}
-
-TEST(Answers, ASearchedTermWhoseSizeIsNotKnownToAQuarterIsTentative) {
-  const auto is_confirmed = [](double standard_error, bool has_constant) {
-    FoundTerm peak = found_term(0, "stribeck", "v", 1.2, standard_error);
-    if (has_constant) {
-      peak.constants = Eigen::VectorXd::Constant(1, 0.1);
-      peak.values.push_back({"c", "v", 0.1, 0.01});
-    }
-    Missing missing = answer_with({peak});
-    decide(missing, true);
-    EXPECT_EQ(missing.notes.empty(), missing.found[0].confirmed);
-    return missing.found[0].confirmed;
-  };
-  EXPECT_TRUE(is_confirmed(0.15, true));
-  EXPECT_FALSE(is_confirmed(0.16, true));
-  EXPECT_TRUE(is_confirmed(0.16, false));
 }
 
 TEST(Answers, OneHingeStandsForAHingeAtTheOtherSideWithALineAndAnOffset) {

@@ -185,34 +185,6 @@ TEST(InTime, StandardErrorsHoldUnderCorrelatedNoise) {
   EXPECT_GE(covered, named * 80 / 100);
 }
 
-// What judge_in_time() says of the term `linear q`, fitted to single rows.
-std::string hangs_on(Force hidden) {
-  const MassLog log = log_of(3, 1000, 0.02, 0.0, hidden);
-  const Simulation simulation = tabulated(log.simulated, {"force"});
-  const std::vector<ModelTerm> terms = standard_terms(log.inputs);
-  const auto linear = std::ranges::find_if(
-      terms, [](const ModelTerm& term) { return term.family == "linear" && term.location == "q"; });
-  const TermModel model(simulation, log.inputs, {"force"}, terms);
-  TermData data{.samples = blocks(1000, 1),
-                .measured = log.measured.values,
-                .sigma = Eigen::VectorXd::Ones(1),
-                .stretches = std::vector<Eigen::Index>(1000, 0)};
-  Settled settled;
-  const PlacedTerm placed{static_cast<std::size_t>(linear - terms.begin()), 0, {}, Eigen::VectorXd::Zero(1), 0.0};
-  settled.fit = fit_terms(model, data, Eigen::Vector2d(0.0, 1.0), {placed});
-  Missing missing;
-  missing.found.resize(1);
-  missing.found.front().term = placed.term;
-  missing.found.front().inputs = {"q"};
-  judge_in_time(model, data, log.inputs, log.measured, settled, missing);
-  return missing.found.front().hangs_on;
-}
-
-TEST(InTime, ATermThatReversalsAloneShowHangsOnTheSpeed) {
-  EXPECT_EQ(hangs_on([](double q, double, double) { return 0.4 * q; }), "");
-  EXPECT_EQ(hangs_on([](double q, double dq, double) { return std::abs(dq) < 0.04 ? 4.0 * q : 0.0; }), "dq");
-}
-
 TEST(InTime, RowsOfSmoothNoisyInputsAreTakenForALog) {
   MassLog log = log_of(1, 1000, 0.05, 0.0, drag);
   log.inputs.instants = {};

@@ -90,8 +90,6 @@ struct FoundTerm {
   std::string shown_by;     ///< ModelTerm::shown_by
   /// The error on the samples set aside is smaller with it than without; true if there are none.
   bool shrinks_gap = true;
-  /// The input at whose smallest values the term lives although it is no function of it alone; empty: none.
-  std::string hangs_on;
   bool is_refuted = false;  ///< it makes that error larger, by more than chance allows for a term of its size
 };
 

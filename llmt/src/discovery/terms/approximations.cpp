@@ -67,29 +67,4 @@ std::vector<bool> approximations(const std::vector<FoundTerm>& all, bool in_time
   return approximate;
 }
 
-std::vector<bool> cancelling_terms(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
-                                   const std::vector<FoundTerm>& found) {
-  constexpr double nearly = 10.0;
-  struct Sum {
-    Eigen::VectorXd values;
-    double squares = 0.0;
-  };
-  std::map<Place, Sum> sums;
-  const Eigen::MatrixXd simulated = model.simulated(parameters);
-  const auto place_of = [](const FoundTerm& term) { return Place{sorted_inputs(term), term.output_index}; };
-  for (const FoundTerm& term : found) {
-    const PlacedTerm placed{term.term, term.output_index, term.constants, term.coefficients, 0.0};
-    const Eigen::VectorXd own = stacked_signature(model, data, placed, simulated) * term.coefficients;
-    Sum& sum = sums.try_emplace(place_of(term), Eigen::VectorXd::Zero(own.size())).first->second;
-    sum.values += own;
-    sum.squares += own.squaredNorm();
-  }
-  std::vector<bool> cancelling;
-  for (const FoundTerm& term : found) {
-    const Sum& sum = sums.at(place_of(term));
-    cancelling.push_back(!term.inputs.empty() && sum.squares > nearly * sum.values.squaredNorm());
-  }
-  return cancelling;
-}
-
 }  // namespace llmt::discovery

@@ -46,10 +46,9 @@ bool has_same_terms(const Missing& a, const Missing& b) {
 
 // Whether what the answers add is within a tenth the same at all rows.
 bool is_same_function(const Missing& a, const Missing& b) {
-  constexpr double same = 0.1;
   for (Eigen::Index o = 0; o < a.corrected.cols(); ++o) {
     const double size = (a.corrected.col(o) - a.before.col(o)).norm();
-    if ((a.corrected.col(o) - b.corrected.col(o)).norm() > same * size) return false;
+    if ((a.corrected.col(o) - b.corrected.col(o)).norm() > same_function * size) return false;
   }
   return true;
 }
@@ -210,10 +209,9 @@ bool leaves_something(const Missing& missing) {
 }
 
 Missing better_of(Missing found, Missing other, double ratio) {
-  constexpr double margin = 3.0;  // a likelihood 20 times as large
   const bool may_replace = is_certain(other) || !is_certain(found);
-  if (ratio < -margin) return found;
-  if (ratio > margin) return may_replace ? other : with_rival(std::move(found), other, true);
+  if (ratio < -likelihood_margin) return found;
+  if (ratio > likelihood_margin) return may_replace ? other : with_rival(std::move(found), other, true);
   const bool is_tentative = !is_same_function(found, other);
   const bool is_simpler = fitted_numbers(other) < fitted_numbers(found);
   return is_simpler && may_replace ? with_rival(std::move(other), found, is_tentative)

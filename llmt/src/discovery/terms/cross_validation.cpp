@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "discovery/terms/outliers.hpp"
 #include "discovery/terms/row_filter.hpp"
 #include "discovery/terms/row_split.hpp"
 #include "discovery/terms/term_question.hpp"
@@ -66,12 +67,11 @@ Eigen::MatrixXd CrossValidation::errors(const Missing& answer) const {
 
 double log_likelihood_ratio(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
                             double independent_share) {
-  constexpr double far = 5.0;
   double ratio = 0.0;
   for (Eigen::Index o = 0; o < found.cols(); ++o) {
     const Eigen::ArrayXd own = found.col(o).cwiseAbs();
     const Eigen::ArrayXd others = other.col(o).cwiseAbs();
-    const Eigen::ArrayXd counts = (own.min(others) <= far * floors(o)).cast<double>();
+    const Eigen::ArrayXd counts = (own.min(others) <= far_off * floors(o)).cast<double>();
     const double smallest = std::numeric_limits<double>::min();
     const double left = (counts * own.square()).sum() + smallest;
     const double left_by_other = (counts * others.square()).sum() + smallest;

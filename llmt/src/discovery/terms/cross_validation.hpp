@@ -29,6 +29,11 @@ class CrossValidation {
   TermData data_;
 };
 
+/// Between minus this and this a logarithm of a ratio of likelihoods does not decide: 20 times as likely.
+inline constexpr double likelihood_margin = 3.0;
+/// Functions that differ by no more than this share of one of them are the same.
+inline constexpr double same_function = 0.1;
+
 /// The logarithm of the ratio of likelihoods of two answers, from their errors (samples x d) where fits have not used
 /// the samples:
 ///

@@ -8,6 +8,7 @@
 #include "discovery/terms/fitted_parameters.hpp"
 #include "discovery/terms/groups.hpp"
 #include "discovery/terms/missing_findings.hpp"
+#include "discovery/terms/outliers.hpp"
 #include "discovery/terms/row_filter.hpp"
 #include "discovery/terms/row_split.hpp"
 #include "discovery/terms/standstill.hpp"
@@ -51,8 +52,6 @@ RowSplit with_samples(const RowSplit& split, const std::vector<bool>& kept) {
 std::optional<RowSplit> without_outliers(const TermModel& model, const MeasuredOutputs& measured,
                                          const Missing& missing, const Eigen::VectorXd& parameters,
                                          const std::vector<PlacedTerm>& placed, const RowSplit& split) {
-  constexpr double far = 5.0;
-  constexpr double largest_share = 0.15;
   const Eigen::MatrixXd left =
       (means_of_filtered(measured.values, split.searched) - means(model.predict(parameters, placed), split.searched))
           .cwiseAbs();
@@ -60,10 +59,11 @@ std::optional<RowSplit> without_outliers(const TermModel& model, const MeasuredO
   std::vector<bool> kept(left.rows(), true);
   for (Eigen::Index i = 0; i < left.rows(); ++i) {
     for (std::size_t o = 0; o < missing.gaps.size(); ++o) {
-      if (left(i, static_cast<Eigen::Index>(o)) > far * missing.gaps[o].noise_floor) kept[i] = false;
+      if (left(i, static_cast<Eigen::Index>(o)) > far_off * missing.gaps[o].noise_floor) kept[i] = false;
     }
   }
-  if (static_cast<double>(std::ranges::count(kept, false)) > largest_share * static_cast<double>(left.rows())) {
+  if (static_cast<double>(std::ranges::count(kept, false)) >
+      largest_share_of_outliers * static_cast<double>(left.rows())) {
     return std::nullopt;
   }
   for (Eigen::Index i = 0; i < left.rows(); ++i) {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "discovery/search/workspace.hpp"
+#include "discovery/terms/cross_validation.hpp"
 #include "discovery/terms/term_question.hpp"
 
 namespace llmt::discovery {
@@ -78,8 +79,6 @@ std::string where(const TermModel& model, const ModelTerm& own, const ModelTerm&
 }  // namespace
 
 void name_groups(const TermModel& model, const TermData& data, const TermFit& fit, Missing& missing) {
-  constexpr double margin = 3.0;  // as in contests
-  constexpr double same = 0.1;
   constexpr double hardly = 0.02;
   const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
   const double samples = data.independent_share * static_cast<double>(data.samples.size());
@@ -90,7 +89,7 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
     const InPlace own = place.with(model, data, fit.placed[k], simulated);
     FoundTerm& found = missing.found[k];
     const Eigen::Index output = fit.placed[k].output;
-    double farthest = same;
+    double farthest = same_function;
     std::optional<InPlace> differing;
     for (std::size_t t = 0; t < model.terms().size(); ++t) {
       const ModelTerm& term = model.terms()[t];
@@ -108,7 +107,7 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
             0.5 * samples * std::log(other.left / own.left) + 0.5 * (other.numbers - own.numbers) * std::log(samples);
         const double difference = (other.function - own.function).norm() / own.function.norm();
         const bool contains_it = other.numbers > own.numbers && difference < hardly;
-        if (!(evidence <= margin) || contains_it) continue;
+        if (!(evidence <= likelihood_margin) || contains_it) continue;
         const auto is_named = [&](const RivalTerms& rival) {
           return rival.what == name_of(term) || rival.what.starts_with(name_of(term) + " (");  // with its constant
         };

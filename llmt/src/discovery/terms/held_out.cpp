@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "discovery/terms/motion.hpp"
+#include "discovery/terms/outliers.hpp"
 #include "discovery/terms/term_question.hpp"
 #include "llmt/discovery/terms.hpp"
 
@@ -22,14 +23,12 @@ Eigen::VectorXd squared_errors(const TermModel& model, const TermData& data, con
 // measure of what is left.
 TermData without_outliers(const TermData& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
                           double noise) {
-  constexpr double far = 5.0;
-  constexpr double largest_share = 0.15;
-  const double limit = far * far * noise * static_cast<double>(data.measured.cols());
+  const double limit = far_off * far_off * noise * static_cast<double>(data.measured.cols());
   std::vector<std::size_t> outliers;
   for (Eigen::Index i = 0; i < before.size(); ++i) {
     if (std::min(before(i), after(i)) > limit) outliers.push_back(static_cast<std::size_t>(i));
   }
-  return static_cast<double>(outliers.size()) > largest_share * static_cast<double>(before.size())
+  return static_cast<double>(outliers.size()) > largest_share_of_outliers * static_cast<double>(before.size())
              ? data
              : without_samples(data, outliers);
 }
@@ -70,47 +69,6 @@ std::vector<Eigen::Index> rows_of_growth(const Samples& samples, const Eigen::Ve
     for (const Eigen::Index row : samples.rows_of(i)) rows.push_back(row);
   }
   return rows;
-}
-
-// Terms of an input that is a derivative of the output stand for a state, too.
-void find_derivatives_of_outputs(const Derivatives& derivatives, const Inputs& inputs, const MeasuredOutputs& measured,
-                                 Missing& missing) {
-  for (FoundTerm& found : missing.found) {
-    if (found.generic || found.inputs.size() != 1) continue;
-    const auto place = std::ranges::find(inputs.names, found.inputs.front()) - inputs.names.begin();
-    if (!is_derivative_of(derivatives, inputs.values.col(place), measured.values.col(found.output_index))) continue;
-    found.inner_state = "the output depends on its own derivative " + found.inputs.front() +
-                        ", as with a delay, clocks that differ, or a spring or damper behind it";
-    found.shown_by = "a signal measured behind it, or a step on the clocks of all signals";
-  }
-}
-
-// Where a speed is small a machine sticks, filters round its friction, and signs are not known: what is wrong there is
-// easily taken for a function of another input.
-void judge_without_reversals(const TermModel& model, const TermData& kept, const Inputs& inputs,
-                             const std::vector<Eigen::Index>& speeds, const Settled& settled, Missing& missing) {
-  if (settled.fit.placed.empty()) return;
-  for (const Eigen::Index j : speeds) {
-    const Eigen::VectorXd sizes = means(inputs.values.col(j).cwiseAbs(), kept.samples);
-    std::vector<std::size_t> order(sizes.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return sizes(static_cast<Eigen::Index>(i)); });
-    constexpr double share = 0.15;
-    order.resize(static_cast<std::size_t>(share * static_cast<double>(order.size())));
-    const TermFit fit = fit_terms(model, without_samples(kept, order), settled.fit.parameters, settled.fit.placed);
-    for (std::size_t t = 0; t < settled.fit.placed.size(); ++t) {
-      const PlacedTerm& placed = settled.fit.placed[t];
-      const ModelTerm& term = model.terms()[placed.term];
-      if (term.generic || (term.inputs.size() == 1 && term.inputs.front() == inputs.names[j])) continue;
-      const double value = placed.coefficients(0);
-      const double without = fit.placed[t].coefficients(0) * (value < 0.0 ? -1.0 : 1.0);
-      constexpr double surprising = 4.0;
-      if (!(without < 0.5 * std::abs(value)) || !(std::abs(value) - without > surprising * fit.errors[t](0))) continue;
-      for (FoundTerm& found : missing.found) {
-        if (found.term == placed.term && found.output_index == placed.output) found.hangs_on = inputs.names[j];
-      }
-    }
-  }
 }
 
 }  // namespace
@@ -157,16 +115,19 @@ void judge_held_out(const TermModel& model, const TermData& kept, const TermData
   }
 }
 
-void judge_in_time(const TermModel& model, const TermData& kept, const Inputs& inputs, const MeasuredOutputs& measured,
-                   const Settled& settled, Missing& missing) {
+void find_states_of_outputs(const Inputs& inputs, const MeasuredOutputs& measured, Missing& missing) {
   if (missing.found.empty()) return;
   const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
   constexpr Eigen::Index lags = 2;
   const Derivatives derivatives(rows, lags * smooth_lag(rows, inputs.values));
-  std::vector<Eigen::Index> speeds;
-  for (const Motion& motion : motions(derivatives, inputs)) speeds.push_back(motion.speed);
-  judge_without_reversals(model, kept, inputs, speeds, settled, missing);
-  find_derivatives_of_outputs(derivatives, inputs, measured, missing);
+  for (FoundTerm& found : missing.found) {
+    if (found.generic || found.inputs.size() != 1) continue;
+    const auto place = std::ranges::find(inputs.names, found.inputs.front()) - inputs.names.begin();
+    if (!is_derivative_of(derivatives, inputs.values.col(place), measured.values.col(found.output_index))) continue;
+    found.inner_state = "the output depends on its own derivative " + found.inputs.front() +
+                        ", as with a delay, clocks that differ, or a spring or damper behind it";
+    found.shown_by = "a signal measured behind it, or a step on the clocks of all signals";
+  }
 }
 
 }  // namespace llmt::discovery

@@ -13,11 +13,8 @@ namespace llmt::discovery {
 void judge_held_out(const TermModel& model, const TermData& kept, const TermData& aside, const TermFit& baseline,
                     const Settled& settled, const InputNoise* errors, Missing& missing);
 
-/// For rows in time. Sets FoundTerm::hangs_on: terms are fitted once more without the samples at which a speed, that
-/// the term is no function of alone, is among its smallest 15 %. A term hangs on that speed if its first coefficient
-/// falls to less than a half, by more than 4 standard errors. And sets FoundTerm::inner_state of terms whose input is a
-/// derivative of the output by time.
-void judge_in_time(const TermModel& model, const TermData& kept, const Inputs& inputs, const MeasuredOutputs& measured,
-                   const Settled& settled, Missing& missing);
+/// For rows in time. Sets FoundTerm::inner_state of terms whose input is a derivative of the output by time: they stand
+/// for a state.
+void find_states_of_outputs(const Inputs& inputs, const MeasuredOutputs& measured, Missing& missing);
 
 }  // namespace llmt::discovery

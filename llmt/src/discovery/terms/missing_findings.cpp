@@ -9,6 +9,7 @@
 
 #include "discovery/terms/approximations.hpp"
 #include "discovery/terms/input_noise.hpp"
+#include "discovery/terms/outliers.hpp"
 #include "discovery/terms/structure.hpp"
 #include "llmt/discovery/terms.hpp"
 
@@ -46,20 +47,6 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
   }
   set_estimates(placed, errors, found);
   return found;
-}
-
-// The coefficient whose interval of 95 % reaches zero or, of a term with a constant, farther than a quarter of it; -1:
-// none. Noise at the inputs, or few rows where the term lives, leave its size and its shape to each other.
-Eigen::Index uncertain_coefficient(const FoundTerm& found) {
-  const double far = found.constants.size() > 0 ? 0.25 : 1.0;
-  constexpr double quantile = 1.96;
-  // A wave and a law of several parts may have parts of no size.
-  if (found.constants.size() == 0 && found.coefficients.size() > 1) return -1;
-  for (Eigen::Index k = 0; k < found.coefficients.size(); ++k) {
-    const TermValue& own = found.values[static_cast<std::size_t>(k)];
-    if (quantile * own.standard_error > far * std::abs(own.value)) return k;
-  }
-  return -1;
 }
 
 }  // namespace
@@ -166,7 +153,7 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
   return all;
 }
 
-void decide(Missing& missing, bool in_time, const std::vector<bool>& cancelling) {
+void decide(Missing& missing, bool in_time) {
   const bool is_nothing = missing.verdict.answer == Answer::nothing_missing;
   missing.answer = is_nothing && !missing.structure.empty() ? Answer::unknown : missing.verdict.answer;
   constexpr double certain = 2.0;  // standard errors
@@ -185,30 +172,17 @@ void decide(Missing& missing, bool in_time, const std::vector<bool>& cancelling)
   std::set<std::vector<std::string>> noted;
   for (std::size_t k = 0; k < missing.found.size(); ++k) {
     FoundTerm& found = missing.found[k];
-    const bool cancels = !cancelling.empty() && cancelling[k];
     const bool is_beside_structure =
         std::ranges::find(missing.structure, found.output, &Structure::output) != missing.structure.end();
     found.confirmed = missing.answer != Answer::failed_held_out && missing.verdict.answer != Answer::unknown &&
-                      !found.generic && !approximate[k] && !cancels && !is_beside_structure && found.shrinks_gap &&
-                      found.hangs_on.empty();
+                      !found.generic && !approximate[k] && !is_beside_structure && found.shrinks_gap;
     // What stands beside a state, and explains less, may be what the state does beyond its model.
     if (found.inner_state.empty() && found.share < share_of_state) found.confirmed = false;
     if (!found.inner_state.empty() && !is_state(found)) found.confirmed = false;
-    const Eigen::Index loose = in_time && found.inner_state.empty() ? uncertain_coefficient(found) : -1;
-    if (loose >= 0 && found.confirmed) {
-      const TermValue& own = found.values[static_cast<std::size_t>(loose)];
-      found.confirmed = false;
-      missing.notes.push_back(
-          fmt::format("the {} of {} is {:.3g} with a standard error of {:.2g}: the term is tentative, "
-                      "because its size is not known{}",
-                      own.name, found.location.empty() ? found.family : found.family + " " + found.location, own.value,
-                      own.standard_error, found.constants.size() > 0 ? " to a quarter" : ""));
-    }
-    if (!(approximate[k] || cancels) || found.inputs.empty() || !noted.insert(sorted_inputs(found)).second) continue;
+    if (!approximate[k] || found.inputs.empty() || !noted.insert(sorted_inputs(found)).second) continue;
     const std::string inputs = fmt::format("{}", fmt::join(sorted_inputs(found), " and "));
-    missing.notes.push_back(
-        (approximate[k] ? "there are many terms of " + inputs : "the terms of " + inputs + " nearly cancel") +
-        ": together they may approximate one that was not tried");
+    missing.notes.push_back("there are many terms of " + inputs +
+                            ": together they may approximate one that was not tried");
   }
 }
 
@@ -317,8 +291,7 @@ bool may_be_applied(const Missing& missing) {
 
 Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,
            const Eigen::VectorXd& after, double noise_floor) {
-  // About what makes a row searched an outlier. A row that only the terms found throw off is none.
-  constexpr double far = 5.0;
+  // A row that only the terms found throw off is no outlier.
   Gap gap{.output = std::move(output),
           .before = 0.0,
           .after = 0.0,
@@ -327,7 +300,7 @@ Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::Vect
           .nominal = 0.0};
   Eigen::Index used = 0;
   for (Eigen::Index i = 0; i < before.size(); ++i) {
-    if (std::min(std::abs(before(i)), std::abs(after(i))) > far * noise_floor) {
+    if (std::min(std::abs(before(i)), std::abs(after(i))) > far_off * noise_floor) {
       ++gap.outliers;
       continue;
     }
@@ -336,9 +309,7 @@ Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::Vect
     gap.after += after(i) * after(i);
     ++used;
   }
-  // Where the noise floor is no measure of what is left, nothing is an outlier.
-  constexpr double largest_share = 0.15;
-  if (static_cast<double>(gap.outliers) > largest_share * static_cast<double>(before.size())) {
+  if (static_cast<double>(gap.outliers) > largest_share_of_outliers * static_cast<double>(before.size())) {
     gap.nominal = nominal.squaredNorm();
     gap.before = before.squaredNorm();
     gap.after = after.squaredNorm();

@@ -43,8 +43,7 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 /// - a term is confirmed if it is a cause, the search found no shapes, no structure is left in its output, and it is
 ///   not one of many terms of its inputs, which together may only approximate another function, and it shrinks the
 ///   error on the samples set aside.
-/// `cancelling`: of each term found, whether it nearly cancels others; empty: none.
-void decide(Missing& missing, bool in_time, const std::vector<bool>& cancelling = {});
+void decide(Missing& missing, bool in_time);
 
 /// An answer has a bound from outside: where more is left of an output than some times its known noise, "nothing is
 /// missing" and "parameters only" become "undecided", and the terms of the output are not confirmed.

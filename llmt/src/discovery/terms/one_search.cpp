@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "discovery/terms/approximations.hpp"
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/errors_of_inputs.hpp"
 #include "discovery/terms/fitted_parameters.hpp"
@@ -136,10 +135,9 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   TermData aside = data_of(split.held_out, measured);
   aside.sigma = data.sigma;
   judge_held_out(model, kept, aside, baseline, settled, in_time ? errors.noise.get() : nullptr, missing);
-  if (in_time) judge_in_time(model, kept, inputs, measured, settled, missing);
+  if (in_time) find_states_of_outputs(inputs, measured, missing);
   missing.notes.insert(missing.notes.end(), errors.notes.begin(), errors.notes.end());
-  decide(missing, in_time,
-         in_time ? cancelling_terms(model, kept, settled.fit.parameters, missing.found) : std::vector<bool>{});
+  decide(missing, in_time);
   doubt_uncorrected(errors, missing);
   demand_certainty(missing);
   describe_parameters({model, kept, start, baseline, settled.fit}, sums, options.search.false_alarm_rate, missing);

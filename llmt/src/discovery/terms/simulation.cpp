@@ -125,8 +125,7 @@ Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, cons
     const auto is_unproven = [&](const FoundTerm& found) { return in_time && !found.shrinks_gap; };
     const bool holds =
         missing.answer != Answer::failed_held_out && std::ranges::none_of(missing.found, [&](const FoundTerm& found) {
-          return !found.hangs_on.empty() || is_unproven(found) || beyond.contains(found.term) ||
-                 narrow.contains(found.term);
+          return is_unproven(found) || beyond.contains(found.term) || narrow.contains(found.term);
         });
     if (holds || (trial >= most && beyond.empty() && narrow.empty())) {
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
@@ -136,14 +135,12 @@ Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, cons
     for (const FoundTerm& found : missing.found) {
       const bool fails_again = is_unproven(found) && !unproven.insert(found.term).second;
       const bool is_narrow = narrow.contains(found.term);
-      if (!found.is_refuted && !fails_again && found.hangs_on.empty() && !is_narrow) continue;
+      if (!found.is_refuted && !fails_again && !is_narrow) continue;
       refuted.insert(found.term);
       const std::string place = found.location.empty() ? "" : " " + found.location;
       const std::string name = found.generic ? "an error pattern of" + place : found.family + place;
       notes.push_back(name + " was found and taken back: " +
-                      (!found.hangs_on.empty()
-                           ? fmt::format("without the rows at which {} is small it is not there", found.hangs_on)
-                       : is_narrow        ? fmt::format("it is narrower than the errors of {}", found.location)
+                      (is_narrow          ? fmt::format("it is narrower than the errors of {}", found.location)
                        : found.is_refuted ? "it makes the error on rows set aside larger"
                                           : "it does not make the error on rows set aside smaller"));
     }
