@@ -180,11 +180,7 @@ TEST(Contests, EachAppliesToWhatItLeavesOut) {
   ASSERT_FALSE(regimes.empty());
   EXPECT_EQ(left_out_for(log, log.answer({"square"}), regimes), Searches{});
   EXPECT_EQ(left_out_for(log, log.answer({"saturation"}), regimes), Searches{"saturation regimes "});
-  EXPECT_EQ(left_out_for(log, log.answer({"gain"}), regimes), Searches{"gain regimes "});
 
-  const std::size_t delay = log.term("delay").term;
-  EXPECT_EQ(left_out_for(log, log.answer({"square"}), {delay}),
-            Searches{"linear saturation gain square shapes regimes "});
   Missing of_state = log.answer({"delay"});
   of_state.answer = Answer::inner_state;
   EXPECT_EQ(left_out_for(log, of_state), Searches{"delay "});
@@ -195,8 +191,6 @@ TEST(Contests, EachAppliesToWhatItLeavesOut) {
   EXPECT_EQ(left_out_for(log, unknown, regimes), Searches{""});
   unknown.gaps[0].known_noise = noise;
   EXPECT_EQ(left_out_for(log, unknown, regimes), Searches{});
-  Missing of_shape = log.answer({std::ranges::find_if(log.terms, &ModelTerm::generic)->family});
-  EXPECT_EQ(left_out_for(log, of_shape, regimes), Searches{"shapes regimes "});
 }
 
 }  // namespace

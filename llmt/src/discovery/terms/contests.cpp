@@ -17,10 +17,6 @@ namespace {
 using Terms = std::vector<ModelTerm>;
 using Left = std::set<std::size_t>;
 
-bool is_share_of_the_simulation(const std::string& family) {
-  return family == "gain" || family == "gain_curvature" || family == "load_friction";
-}
-
 bool is_certain(const Missing& missing) {
   return !missing.found.empty() && std::ranges::all_of(missing.found, &FoundTerm::confirmed);
 }
@@ -103,20 +99,9 @@ struct Others {
 // Nothing where the contest does not apply.
 using OthersOf = std::optional<Others> (*)(const Missing&, const Terms&, const Left& refuted);
 
-std::optional<Others> all_but_states(const Missing& found, const Terms& terms, const Left& refuted) {
-  const auto is_state = [&](std::size_t t) { return !terms[t].inner_state.empty(); };
-  if (found.answer == Answer::inner_state || std::ranges::none_of(refuted, is_state)) return std::nullopt;
-  return Others{terms, with({}, terms, [](const ModelTerm& term) { return term.inner_state.empty(); })};
-}
-
 std::optional<Others> states(const Missing& found, const Terms& terms, const Left& refuted) {
   if (found.answer != Answer::inner_state) return std::nullopt;
   return Others{terms, with(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); })};
-}
-
-std::optional<Others> shapes(const Missing& found, const Terms& terms, const Left& refuted) {
-  if (!has_shapes(found)) return std::nullopt;
-  return Others{terms, with(refuted, terms, [](const ModelTerm& term) { return term.generic; })};
 }
 
 std::optional<Others> constants(const Missing& found, const Terms& terms, const Left& refuted) {
@@ -128,14 +113,6 @@ std::optional<Others> constants(const Missing& found, const Terms& terms, const 
   return Others{terms, with(refuted, terms, [&](const ModelTerm& term) {
                   return places.contains(term.inputs) && !term.constants.empty();
                 })};
-}
-
-std::optional<Others> gains(const Missing& found, const Terms& terms, const Left& refuted) {
-  const bool has_gain =
-      std::ranges::any_of(found.found, [](const FoundTerm& term) { return is_share_of_the_simulation(term.family); });
-  if (!has_gain || found.answer == Answer::inner_state) return std::nullopt;
-  return Others{terms,
-                with(refuted, terms, [](const ModelTerm& term) { return is_share_of_the_simulation(term.family); })};
 }
 
 Left without(const Left& left, const Left& others) {
@@ -182,13 +159,9 @@ struct Contest {
   OthersOf others;
 };
 
-// States first, because what stands beside a wrong one explains what it misses; regimes last, because they are tried
-// where everything else leaves something.
-constexpr std::array<Contest, 7> contests = {{{"states alone", all_but_states},
-                                              {"no states", states},
-                                              {"no shapes", shapes},
+// Regimes last, because they are tried where everything else leaves something.
+constexpr std::array<Contest, 4> contests = {{{"no states", states},
                                               {"no searched constants", constants},
-                                              {"no share of the simulation", gains},
                                               {"regimes", plain_regimes},
                                               {"terms of these regimes", same_regimes}}};
 

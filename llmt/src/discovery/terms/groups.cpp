@@ -6,6 +6,8 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "discovery/search/workspace.hpp"
 #include "discovery/terms/cross_validation.hpp"
@@ -76,6 +78,19 @@ std::string where(const TermModel& model, const ModelTerm& own, const ModelTerm&
   return text;
 }
 
+// The likeliest of the members that are not named yet; of many the others say no more.
+void add_rivals(std::vector<std::pair<double, RivalTerms>> members, FoundTerm& found) {
+  constexpr std::size_t most = 8;
+  std::ranges::stable_sort(members, {}, &std::pair<double, RivalTerms>::first);
+  for (auto& [evidence, member] : members) {
+    const auto is_named = [&name = member.what](const RivalTerms& rival) {
+      return rival.what == name || rival.what.starts_with(name + " (");  // with its constant
+    };
+    if (found.rivals.size() >= most) break;
+    if (std::ranges::none_of(found.rivals, is_named)) found.rivals.push_back(std::move(member));
+  }
+}
+
 }  // namespace
 
 void name_groups(const TermModel& model, const TermData& data, const TermFit& fit, Missing& missing) {
@@ -89,6 +104,7 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
     const InPlace own = place.with(model, data, fit.placed[k], simulated);
     FoundTerm& found = missing.found[k];
     const Eigen::Index output = fit.placed[k].output;
+    std::vector<std::pair<double, RivalTerms>> members;  // with the evidence against each
     double farthest = same_function;
     std::optional<InPlace> differing;
     for (std::size_t t = 0; t < model.terms().size(); ++t) {
@@ -108,18 +124,14 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
         const double difference = (other.function - own.function).norm() / own.function.norm();
         const bool contains_it = other.numbers > own.numbers && difference < hardly;
         if (!(evidence <= likelihood_margin) || contains_it) continue;
-        const auto is_named = [&](const RivalTerms& rival) {
-          return rival.what == name_of(term) || rival.what.starts_with(name_of(term) + " (");  // with its constant
-        };
-        if (std::ranges::none_of(found.rivals, is_named)) {
-          found.rivals.push_back({.what = name_of(term), .inputs = term.inputs, .exact = false});
-        }
+        members.push_back({evidence, {.what = name_of(term), .inputs = term.inputs, .exact = false}});
         if (difference > farthest) {
           farthest = difference;
           differing = other;
         }
       }
     }
+    add_rivals(std::move(members), found);
     if (missing.answer == Answer::named && !found.rivals.empty()) missing.answer = Answer::indistinguishable;
     if (!differing) continue;
     Eigen::Index place_of_most = 0;

@@ -162,10 +162,6 @@ void decide(Missing& missing, bool in_time) {
            std::abs(found.values.front().value) > certain * found.values.front().standard_error;
   };
   const bool has_inner_state = std::ranges::any_of(missing.found, is_state);
-  double share_of_state = 0.0;
-  for (const FoundTerm& found : missing.found) {
-    if (is_state(found)) share_of_state = std::max(share_of_state, found.share);
-  }
   if (has_inner_state) missing.answer = Answer::inner_state;
   if (!missing.failing_rows.empty()) missing.answer = Answer::failed_held_out;
   const std::vector<bool> approximate = approximations(missing.found, in_time);
@@ -176,8 +172,6 @@ void decide(Missing& missing, bool in_time) {
         std::ranges::find(missing.structure, found.output, &Structure::output) != missing.structure.end();
     found.confirmed = missing.answer != Answer::failed_held_out && missing.verdict.answer != Answer::unknown &&
                       !found.generic && !approximate[k] && !is_beside_structure && found.shrinks_gap;
-    // What stands beside a state, and explains less, may be what the state does beyond its model.
-    if (found.inner_state.empty() && found.share < share_of_state) found.confirmed = false;
     if (!found.inner_state.empty() && !is_state(found)) found.confirmed = false;
     if (!approximate[k] || found.inputs.empty() || !noted.insert(sorted_inputs(found)).second) continue;
     const std::string inputs = fmt::format("{}", fmt::join(sorted_inputs(found), " and "));
