@@ -56,8 +56,8 @@ struct ModelTerm {
   /// "a delay or a first-order lag": the term stands for a state that the inputs do not show. Empty: it does not.
   std::string inner_state = {};
   std::string shown_by = {};  ///< the signal that would show that state
-  /// The input beyond whose threshold, the last constant, the term acts, and is zero elsewhere. Tried only where the other terms leave
-  /// something. Empty: it acts everywhere.
+  /// The input beyond whose threshold, the last constant, the term acts, and is zero elsewhere. Tried only where the
+  /// other terms leave something. Empty: it acts everywhere.
   std::string regime = {};
   std::string unit = {};       ///< of the first coefficient; empty: that of the output by `per`, of all
   Eigen::VectorXd lower = {};  ///< k plausible limits of the coefficients, or empty: none
