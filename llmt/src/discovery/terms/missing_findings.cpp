@@ -275,9 +275,8 @@ bool may_be_applied(const Missing& missing) {
       return false;
     case Answer::parameters_only:  // nothing was added, so the simulation as it was given is what counts
       return left <= outputs;
-    case Answer::unknown:
-    case Answer::undecided:
-      return !is_worse(missing) && !(2.0 * left > outputs);
+    case Answer::undecided:  // parameters may stand for what is missing
+      return 2.0 * left <= outputs;
     default:
       return !is_worse(missing);
   }
