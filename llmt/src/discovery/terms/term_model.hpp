@@ -112,6 +112,9 @@ Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& mi
 /// samples that are not in time.
 std::vector<std::vector<double>> correlations_of(const TermData& data, const Eigen::VectorXd& residuals);
 
+/// The first row with a value that is not finite, or the number of rows.
+Eigen::Index first_bad_row(const Eigen::MatrixXd& values);
+
 /// (measured - predicted) / sigma, stacked sample by sample.
 Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
                                  const std::vector<PlacedTerm>& placed);
