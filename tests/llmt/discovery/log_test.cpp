@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <span>
 #include <stdexcept>
 #include <string>
 
 #include "discovery/terms/input_noise.hpp"
 #include "discovery/terms/row_filter.hpp"
+#include "discovery/terms/term_question.hpp"
 #include "llmt/discovery/search.hpp"
 #include "llmt/discovery/signals.hpp"
 #include "llmt/discovery/simulation.hpp"
@@ -200,6 +202,59 @@ TEST(KnownNoise, BoundsTheAllClear) {
   EXPECT_GT(bounded.gaps[0].after, 20.0 * bounded.gaps[0].known_noise);
   rows.measured.noise.setConstant(0.5);
   EXPECT_NE(missing_from(rows).answer, Answer::undecided);
+}
+
+// Its own constant is fitted; terms without one have found the threshold before.
+TEST(Regimes, ATermWithAConstantIsNamedBeyondAThreshold) {
+  const Model model;
+  constexpr double threshold = 0.25;
+  const auto torque = [&](double t) {
+    const Eigen::Vector3d x = motion(t);
+    return model.torque(x) + (x(0) > threshold ? 0.8 * std::tanh(x(1) / 0.3) : 0.0);
+  };
+  const Missing missing = missing_from(rows_of_log(1, model, 0.02, torque));
+  ASSERT_EQ(missing.found.size(), 1u);
+  const FoundTerm& found = missing.found.front();
+  EXPECT_EQ(found.family, "tanh");
+  EXPECT_EQ(found.location, "dq where q > c");
+  ASSERT_EQ(found.constants.size(), 2);
+  EXPECT_NEAR(found.constants(0), 0.3, 0.05);
+  EXPECT_NEAR(found.constants(1), threshold, 0.05);
+  EXPECT_NEAR(found.coefficients(0), 0.8, 0.08);
+  EXPECT_EQ(found.values.back().name, "threshold");
+  EXPECT_GT(found.values.back().standard_error, 0.0);
+}
+
+// Of two thresholds each has the distance to the next value tried that explains clearly less.
+TEST(Regimes, AStepBeyondAThresholdHasErrorsOfBoth) {
+  constexpr Eigen::Index n = 400;
+  llmt::Random random(3);
+  Inputs inputs{{"a", "b"}, Eigen::MatrixXd(n, 2)};
+  Eigen::MatrixXd measured(n, 1);
+  Samples points;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    inputs.values.row(i) << 2.0 * random.uniform() - 1.0, 2.0 * random.uniform() - 1.0;
+    const bool acts = inputs.values(i, 0) > 0.1 && inputs.values(i, 1) > -0.2;
+    measured(i, 0) = (acts ? 1.0 : 0.0) + 0.05 * random.normal();
+    points.add(std::span(&i, 1));
+  }
+  const std::vector<ModelTerm> terms = regime_terms(inputs, standard_terms(inputs));
+  const auto step = std::ranges::find_if(
+      terms, [](const ModelTerm& term) { return term.family == "step" && term.location == "a where b > c"; });
+  ASSERT_NE(step, terms.end());
+  const Simulation simulation = tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"});
+  const TermModel model(simulation, inputs, {"y"}, terms);
+  const TermData data{.samples = points, .measured = measured, .sigma = Eigen::VectorXd::Ones(1), .stretches = {}};
+  const auto index = static_cast<std::size_t>(step - terms.begin());
+  TermFit fit = fit_terms(model, data, Eigen::Vector2d(0.0, 1.0),
+                          {{index, 0, Eigen::Vector2d(0.1, -0.2), Eigen::VectorXd::Ones(1), 0.0}});
+  set_trial_errors(model, data, fit);
+  EXPECT_EQ(fit.placed[0].constants, Eigen::Vector2d(0.1, -0.2));
+  EXPECT_NEAR(fit.placed[0].coefficients(0), 1.0, 0.02);
+  for (const Eigen::Index constant : {1, 2}) {
+    EXPECT_GT(fit.errors[0](constant), 0.0);
+    EXPECT_LT(fit.errors[0](constant), 0.25);  // a few steps of those tried
+  }
 }
 
 TEST(Regimes, AnEffectBeyondAThresholdIsNamedWithIt) {

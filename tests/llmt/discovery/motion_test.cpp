@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "discovery/terms/motion.hpp"
@@ -110,6 +111,15 @@ Inputs with_rests(std::uint64_t seed) {
   }
   for (Eigen::Index i = 0; i < rows; ++i) values(i, 1) += 1e-3 * noise.normal();
   return inputs_of(values);
+}
+
+TEST(Rest, TermsTakeASpeedForZeroWithinItsKnownErrors) {
+  Inputs inputs{{"v", "w", "x"}, Eigen::MatrixXd::Zero(4, 3)};
+  inputs.zero_bands = Eigen::Vector3d(0.1, 0.1, 0.01);
+  inputs.noise = Eigen::Vector3d(0.01, std::numeric_limits<double>::quiet_NaN(), 0.01);
+  EXPECT_EQ(bands_of_errors(inputs), inputs.zero_bands);  // rows that no filter made
+  inputs.cutoff = 6.0;
+  EXPECT_EQ(bands_of_errors(inputs), Eigen::Vector3d(0.04, 0.1, 0.01));
 }
 
 TEST(Rest, RowsAtRestAreNoEvidenceOfFriction) {

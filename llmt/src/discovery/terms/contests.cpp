@@ -26,7 +26,7 @@ bool has_shapes(const Missing& missing) { return std::ranges::any_of(missing.fou
 Eigen::Index fitted_numbers(const Missing& missing) {
   Eigen::Index count = 0;
   for (const FoundTerm& term : missing.found) {
-    count += (term.whole ? 0 : term.coefficients.size()) + term.constants.size() + (term.regime.empty() ? 0 : 1);
+    count += (term.whole ? 0 : term.coefficients.size()) + term.constants.size();
   }
   return count;
 }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
+#include <string>
 #include <vector>
 
 #include "discovery/terms/one_search.hpp"
@@ -9,8 +11,9 @@
 
 namespace llmt::discovery {
 
-/// K-fold cross-validation of answers, whose terms stand, on all samples but those apart: in turn, every fifth of twice
-/// five stretches is left out, numbers of terms and parameters are fitted to the others, and the stretch is predicted.
+/// K-fold cross-validation of answers, whose terms stand, on all samples but those apart: in turn, two of
+/// ten stretches are left out, numbers of terms and parameters are fitted to the others, and the two are predicted
+/// (Stone 1974).
 class CrossValidation {
  public:
   /// Keeps references.
@@ -29,7 +32,7 @@ class CrossValidation {
   TermData data_;
 };
 
-/// Between minus this and this a logarithm of a ratio of likelihoods does not decide: 20 times as likely.
+/// Two answers of which neither is e^3, or 20, times as likely as the other cannot be told apart.
 inline constexpr double likelihood_margin = 3.0;
 /// Functions that differ by no more than this share of one of them are the same.
 inline constexpr double same_function = 0.1;
