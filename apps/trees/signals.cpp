@@ -139,7 +139,7 @@ void add_signals(CLI::App& app) {
       "Leave rows out below this speed, one for all positions or one each; 0 keeps all [keep all; with --independent "
       "from the noise]");
   add_count<Eigen::Index>(*command, "--every", arguments->options.every, 1,
-                          "Samples from one row to the next [a sixth of what makes noise independent]");
+                          "Samples from one row to the next [a twelfth of what makes noise independent]");
   command->add_flag("--independent", arguments->options.independent,
                     "Rows whose noise is independent, without standstill and reversals: for a fit of your own");
   command->add_option("--group", arguments->columns.group, "Which run a row belongs to; no filter reaches across runs")

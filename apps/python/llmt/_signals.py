@@ -133,7 +133,7 @@ def signals(
         Rows below this speed of a position are left out, 0: none. By default none are; with ``independent`` the speed is
         found from the noise and the filter.
     every : int
-        Samples from one row to the next. By default a sixth of those that make white noise of the log independent, so
+        Samples from one row to the next. By default a twelfth of those that make white noise of the log independent, so
         that :func:`llmt.discover` can filter a simulation at these rows alike (``signals`` of it).
     independent : bool
         Rows whose noise is independent, without standstill and reversals: for a least squares fit of your own.

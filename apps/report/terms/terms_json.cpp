@@ -67,6 +67,16 @@ Json regime_json(const discovery::FoundTerm& found) {
           {"acts", found.location.ends_with("> c") ? "above" : "below"}};
 }
 
+// Why a term is not certain.
+Json objections_json(const discovery::Missing& missing, std::size_t term) {
+  Json reasons = Json::array();
+  for (const discovery::Objection& objection : missing.objections) {
+    if (std::ranges::find(objection.terms, term) != objection.terms.end())
+      reasons.push_back(discovery::to_string(objection.reason));
+  }
+  return reasons;
+}
+
 Json found_json(const discovery::FoundTerm& found, const TermsSummary& summary, const Words& words) {
   Json parameters = Json::array();
   for (const discovery::TermValue& value : found.values) {
@@ -114,8 +124,11 @@ Json time_json(const TermsSummary& summary) {
 
 Json effects_json(const TermsSummary& summary, const Words& words) {
   Json effects = Json::array();
-  for (const discovery::FoundTerm& found : summary.missing.found) {
-    if (!found.generic) effects.push_back(found_json(found, summary, words));
+  for (std::size_t k = 0; k < summary.missing.found.size(); ++k) {
+    const discovery::FoundTerm& found = summary.missing.found[k];
+    if (found.generic) continue;
+    effects.push_back(found_json(found, summary, words));
+    effects.back()["objections"] = objections_json(summary.missing, k);
   }
   return effects;
 }

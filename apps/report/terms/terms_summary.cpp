@@ -18,14 +18,20 @@ using discovery::Missing;
 
 std::string found_text(const Missing& missing) {
   std::string text;
-  int place = 0;
-  for (const FoundTerm& found : missing.found) {
-    text += fmt::format("\n{}. {}{}: without it the other terms would explain {:.0f} % less\n", ++place,
+  for (std::size_t k = 0; k < missing.found.size(); ++k) {
+    const FoundTerm& found = missing.found[k];
+    text += fmt::format("\n{}. {}{}: without it the other terms would explain {:.0f} % less\n", k + 1,
                         title_of(found, missing.gaps.size() > 1),
                         found.generic     ? ""
                         : found.confirmed ? ", confirmed"
                                           : ", tentative",
                         100.0 * found.share);
+    for (const discovery::Objection& objection : missing.objections) {
+      const bool is_against_it = std::ranges::find(objection.terms, k) != objection.terms.end();
+      if (is_against_it && objection.reason != discovery::Reason::shape) {
+        text += fmt::format("   tentative because {}\n", discovery::to_string(objection.reason));
+      }
+    }
     if (found.generic) {
       text += "   no term that was tried has this shape; the corrected simulation follows it as measured\n";
       continue;
@@ -37,7 +43,6 @@ std::string found_text(const Missing& missing) {
     if (found.coefficients.size() == 2 && found.values.front().name == "C") {
       text += fmt::format("   amplitude sqrt(C^2 + S^2) = {} {}\n", number(found.coefficients.norm()), found.output);
     }
-    if (!found.shrinks_gap) text += "   on the rows set aside it does not help\n";
     for (const discovery::RivalTerms& rival : found.rivals) {
       text += fmt::format(
           "   or instead {}: {}\n", rival.what,

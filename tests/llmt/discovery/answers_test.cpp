@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "discovery/search/replacements.hpp"
+#include "discovery/terms/decision.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "search_cases.hpp"
@@ -40,7 +41,8 @@ TEST(Answers, AnOffsetBesideAPowerIsTentativeWhereAFunctionOfTheInputCouldStandF
   const auto power_and_offset = [](std::vector<RivalTerms> rivals) {
     Missing missing = answer_with({found_term(0, "cube", "T", 1.0, 0.01), found_term(1, "offset", "", -3.0, 0.1)});
     missing.found[1].rivals = std::move(rivals);
-    decide(missing, true);
+    judge_findings(missing, true);
+    decide(missing);
     for (const std::string& note : missing.notes) EXPECT_NE(note.find("of T: together"), std::string::npos) << note;
     return missing.found[0].confirmed && missing.found[1].confirmed;
   };
@@ -54,7 +56,8 @@ TEST(Answers, ATermForWhichAnOffsetCouldStandCountsAsOneBesideAPower) {
   const auto power_and_saturation = [](std::vector<RivalTerms> rivals) {
     Missing missing = answer_with({found_term(0, "cube", "T", 1.0, 0.01), found_term(1, "saturation", "fan", -3, 0.1)});
     missing.found[1].rivals = std::move(rivals);
-    decide(missing, true);
+    judge_findings(missing, true);
+    decide(missing);
     return missing.found[0].confirmed;
   };
   EXPECT_TRUE(power_and_saturation({{"linear T", {"T"}, false}}));

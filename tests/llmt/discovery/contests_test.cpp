@@ -72,7 +72,7 @@ struct Log {
 TEST(CrossValidation, PredictsEveryStretchByAFitOfTheOthers) {
   const Log log;
   const CrossValidation validation(log.simulation, log.inputs, log.measured, log.terms, {.fewest_samples = rows}, {});
-  const Eigen::MatrixXd errors = validation.errors(log.answer({"square", "linear"}));
+  const Eigen::MatrixXd errors = validation.errors(log.answer({"square", "linear"}), {});
   ASSERT_EQ(errors.rows(), rows);
   Eigen::MatrixXd columns(rows, 2);
   columns << log.inputs.values.col(0).cwiseAbs2(), log.inputs.values.col(0);
@@ -142,7 +142,7 @@ TEST(Contests, FewerNumbersHaveTheNameWhereRowsCannotTell) {
   const Missing differing = better_of(found, log.answer({"square"}, 1.11), 0.0);
   EXPECT_EQ(differing.found[0].family, "square");
   EXPECT_FALSE(differing.found[0].confirmed);
-  EXPECT_EQ(differing.answer, Answer::unknown);
+  EXPECT_EQ(differing.answer, Answer::indistinguishable);
 
   // Terms of both have no rival.
   const Missing both = better_of(log.answer({"square", "saturation"}), log.answer({"square", "linear"}), 0.0);

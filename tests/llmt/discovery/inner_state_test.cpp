@@ -161,7 +161,7 @@ TEST(InnerState, ResonantPartIsThatOfAnIntegratedOscillator) {
   for (const double zeta : {0.02, 0.3, 0.9}) {
     const double omega = 2.0 * std::numbers::pi * 4.0;
     const Eigen::VectorXd expected = integrated(instants, omega, zeta, between);
-    EXPECT_LT((resonant_part(rows_of(inputs, values), 4.0, zeta) - expected).cwiseAbs().maxCoeff(), 1e-6);
+    EXPECT_LT((resonant_part(rows_of(inputs, values), values, 4.0, zeta) - expected).cwiseAbs().maxCoeff(), 1e-6);
   }
 }
 
@@ -170,7 +170,7 @@ TEST(InnerState, ResonantPartBeginsAtRestAfterALongInterruption) {
   inputs.instants = inputs.values.col(0);
   inputs.instants.tail(50).array() += 10.0;
   const Eigen::VectorXd values = inputs.instants.array().square().matrix();
-  const Eigen::VectorXd part = resonant_part(rows_of(inputs, values), 2.0, 0.1);
+  const Eigen::VectorXd part = resonant_part(rows_of(inputs, values), values, 2.0, 0.1);
   EXPECT_EQ(part(0), 0.0);
   EXPECT_NEAR(part(50), 0.0, 1e-12 * values(50));
   EXPECT_GT(std::abs(part(60)), 1e-4);

@@ -179,7 +179,7 @@ TEST(Signals, RowsAreDenseEnoughToFilterASimulationAlike) {
   EXPECT_TRUE(dense.dense);
   EXPECT_FALSE(independent.dense);
   EXPECT_EQ(dense.standing, 0);
-  EXPECT_EQ(dense.every, independent.every / 6);
+  EXPECT_EQ(dense.every, independent.every / 12);
   const Eigen::VectorXd weights = low_pass(10.0, static_cast<double>(dense.every) * dense.step);
   const Eigen::Index middle = dense.time.size() / 2;
   const double filtered = weights.dot(dense.positions.col(0).segment(middle - weights.size() / 2, weights.size()));

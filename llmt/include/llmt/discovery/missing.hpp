@@ -76,7 +76,7 @@ struct FoundTerm {
   std::string formula;
   std::vector<std::string> inputs;  ///< ModelTerm::inputs
   bool generic = false;             ///< a shape, not a cause
-  bool confirmed = false;  ///< see Finding::confirmed; and no structure is left, and it is not one of many of an input
+  bool confirmed = false;           ///< no objection to it, nor to another term of its output
   Eigen::Index output_index = 0;
   Eigen::VectorXd coefficients;
   Eigen::VectorXd constants;
@@ -147,6 +147,29 @@ struct VisibleTerm {
   double rms = 0.0;  ///< of the change of the output that it makes
 };
 
+/// Why a term is not confirmed, or an answer not that of the search.
+enum class Reason {
+  larger_error,      ///< the terms make the error on the samples set aside larger
+  known_noise,       ///< more is left of an output than 5 times its known noise
+  drift,             ///< see is_drift()
+  shape,             ///< a shape, not a cause
+  structure,         ///< what is left of the output still depends on the inputs
+  approximation,     ///< one of many terms of the same inputs, which together may stand for another function
+  no_gain,           ///< it does not make the error on the samples set aside smaller
+  vague_state,       ///< a state whose size is within two standard errors of 0
+  errors_of_inputs,  ///< errors of the inputs are more than half of it
+  rival,             ///< another term is as likely, and is another function
+  likelier,          ///< another answer is likelier, but not certain either
+};
+
+/// As a clause, "it is a shape, not a cause".
+std::string to_string(Reason reason);
+
+struct Objection {
+  Reason reason;
+  std::vector<std::size_t> terms;  ///< numbers in Missing::found; empty: against the answer as a whole
+};
+
 /// Outcome of find_missing().
 struct Missing {
   /// As Verdict::answer; but unknown if material structure is left although nothing was found, if is_drift(), and if
@@ -157,10 +180,12 @@ struct Missing {
   Verdict verdict;  ///< of the last search; candidates in it are numbers of `candidates`, samples those of `searched`
   std::vector<std::string> candidates;
   std::vector<FoundTerm> found;       ///< by falling share; shapes last
+  std::vector<Objection> objections;  ///< of which the answer and FoundTerm::confirmed follow
   std::vector<Parameter> parameters;  ///< of the simulation, fitted together with the terms
   Eigen::VectorXd standard_errors;    ///< of those
   std::vector<FittedParameter> fitted_parameters;
   double parameter_gain = 0.0;         ///< of the score, by the free parameters, terms or none beside them
+  bool parameters_explain = false;     ///< that gain is beyond chance
   std::vector<Gap> gaps;               ///< d
   Eigen::MatrixXd before;              ///< n x d: the simulation, its own parameters adjusted
   Eigen::MatrixXd corrected;           ///< n x d: with the terms found
@@ -177,6 +202,9 @@ struct Missing {
   TimeUse time;
   /// n x d, or empty: what the simulated outputs change by where inputs of a motion were smoothed. Gaps include it.
   Eigen::MatrixXd change_by_smoothing;
+  /// n x d, or empty: roots of the weights of rows where errors of the inputs make some less certain than others. Gaps,
+  /// noise floors and known noise are weighted root mean squares.
+  Eigen::MatrixXd weights;
   Eigen::VectorXd zero_bands;  ///< p, or empty: within them an input is at rest and counts as 0, Inputs::zero_bands
   std::vector<Eigen::Index> failing_rows;  ///< set aside, where the terms make the error grow most; if that failed
   int rounds = 0;

@@ -20,7 +20,7 @@ struct SignalsOptions {
   /// Speed up to which a position stands still: one value for all or one each. Empty: found from the noise and the
   /// filter.
   std::vector<double> standstill{};
-  /// Samples from one row kept to the next. 0: rows are six times as dense as rows of independent noise, so that a
+  /// Samples from one row kept to the next. 0: rows are twelve times as dense as rows of independent noise, so that a
   /// simulation at these rows can be filtered alike, see Inputs::cutoff; or as dense, with `independent`.
   Eigen::Index every = 0;
   /// Rows whose noise is independent, without standstill and reversals: for a least squares fit of one's own.

@@ -148,7 +148,7 @@ Signals signals(const Log& log, const SignalsOptions& options) {
 
   Signals signals;
   signals.step = timing.step;
-  constexpr Eigen::Index denser = 6;
+  constexpr Eigen::Index denser = 12;
   const Eigen::Index independent = independent_step(options.cutoff, timing.step);
   const bool drops = options.independent || !options.standstill.empty();
   signals.every = options.every > 0 ? options.every

@@ -25,7 +25,13 @@ bool is_of_inputs_alone(const ModelTerm& term) {
 
 bool ColumnCache::holds(const ModelTerm& term) { return term.constants.empty() && is_of_inputs_alone(term); }
 
-bool ColumnCache::holds_grid(const ModelTerm& term) { return !term.constants.empty() && is_of_inputs_alone(term); }
+bool ColumnCache::is_state_of_inputs(const ModelTerm& term) {
+  return !term.constants.empty() && !term.inner_state.empty() && !term.inputs.empty();
+}
+
+bool ColumnCache::holds_grid(const ModelTerm& term) {
+  return (!term.constants.empty() && is_of_inputs_alone(term)) || is_state_of_inputs(term);
+}
 
 Eigen::MatrixXd ColumnCache::of_samples(const Eigen::MatrixXd& all, const Samples& samples) const {
   std::vector<Eigen::Index> places(samples.size());
@@ -42,11 +48,11 @@ Eigen::MatrixXd ColumnCache::at(const Samples& samples, std::size_t draw, std::s
 
 Eigen::MatrixXd ColumnCache::grid_at(const Samples& samples, std::size_t term,
                                      const std::vector<Eigen::VectorXd>& tried,
-                                     const std::function<Eigen::MatrixXd(const std::vector<Eigen::Index>&)>& columns) {
+                                     const std::function<Eigen::MatrixXd(const Samples&)>& columns) {
   std::vector<double> values;
   for (const Eigen::VectorXd& constants : tried) values.insert(values.end(), constants.begin(), constants.end());
   const auto [place, is_new] = grids_.try_emplace({term, std::move(values)});
-  if (is_new) place->second = columns(all_.rows());
+  if (is_new) place->second = columns(all_);
   return of_samples(place->second, samples);
 }
 

@@ -25,15 +25,18 @@ class ColumnCache {
   /// Whether a term with constants is a function of the inputs alone.
   static bool holds_grid(const ModelTerm& term);
 
+  /// Whether it is one of their past: a state that they move.
+  static bool is_state_of_inputs(const ModelTerm& term);
+
   /// samples x k. `draw`: 0 for the inputs as they are, else the number of the draw of their errors. `columns` computes
   /// them at all rows.
   Eigen::MatrixXd at(const Samples& samples, std::size_t draw, std::size_t term,
                      const std::function<Eigen::MatrixXd()>& columns);
 
-  /// samples x m: columns of a term with constants at all values of them that are tried, not filtered. `columns`
-  /// computes them at the rows it is given.
+  /// samples x m: columns of a term with constants at all values of them that are tried. `columns` computes them at the
+  /// samples it is given.
   Eigen::MatrixXd grid_at(const Samples& samples, std::size_t term, const std::vector<Eigen::VectorXd>& tried,
-                          const std::function<Eigen::MatrixXd(const std::vector<Eigen::Index>&)>& columns);
+                          const std::function<Eigen::MatrixXd(const Samples&)>& columns);
 
  private:
   Samples all_;

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "discovery/terms/decision.hpp"
 #include "discovery/terms/missing_findings.hpp"
 
 namespace llmt::discovery {
@@ -65,9 +66,10 @@ RivalTerms in_its_place(const FoundTerm& term, const std::vector<FoundTerm>& fou
 }
 
 // `other` as a rival of the terms of `found` that it does without.
-Missing with_rival(Missing found, const Missing& other, bool is_tentative) {
+Missing with_rival(Missing found, const Missing& other, std::optional<Reason> objection) {
   const std::vector<FoundTerm> all = found.found;
-  for (FoundTerm& term : found.found) {
+  for (std::size_t k = 0; k < found.found.size(); ++k) {
+    FoundTerm& term = found.found[k];
     const bool is_shared = std::ranges::any_of(other.found, [&](const FoundTerm& own) {
       return own.term == term.term && own.output_index == term.output_index;
     });
@@ -75,10 +77,9 @@ Missing with_rival(Missing found, const Missing& other, bool is_tentative) {
     const RivalTerms rival = in_its_place(term, all, other);
     if (rival.what.empty()) continue;
     term.rivals.insert(term.rivals.begin(), rival);
-    if (found.answer == Answer::named) found.answer = Answer::indistinguishable;
-    if (is_tentative) term.confirmed = false;
+    if (objection) object(found, *objection, {k});
   }
-  demand_certainty(found);
+  decide(found);
   return found;
 }
 
@@ -121,13 +122,21 @@ Left without(const Left& left, const Left& others) {
   return rest;
 }
 
-// Terms without constants find the input and the threshold.
+// "dx where x > c" is that of "dx".
+bool is_part_of(const ModelTerm& in_regime, const FoundTerm& found) {
+  return in_regime.family == found.family &&
+         in_regime.location.substr(0, in_regime.location.find("where ")) == found.location + " ";
+}
+
+// Terms without constants find the input and the threshold, and those that were found everywhere.
 std::optional<Others> plain_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
   const Left regimes = terms_of_regimes(terms);
   // Several terms may imitate one that acts in a part.
   if (regimes.empty() || !(leaves_something(found) || found.found.size() > 1)) return std::nullopt;
-  return Others{terms, with(without(refuted, regimes), terms,
-                            [](const ModelTerm& term) { return !term.regime.empty() && term.constants.size() > 1; })};
+  return Others{terms, with(without(refuted, regimes), terms, [&](const ModelTerm& term) {
+                  return !term.regime.empty() && term.constants.size() > 1 &&
+                         std::ranges::none_of(found.found, [&](const FoundTerm& own) { return is_part_of(term, own); });
+                })};
 }
 
 // "where x > c".
@@ -173,7 +182,7 @@ std::set<std::size_t> terms_of_regimes(const Terms& terms) {
 
 bool leaves_something(const Missing& missing) {
   constexpr double alike = 0.5;  // independent share
-  constexpr double as_noise = 2.0;
+  constexpr double as_noise = 1.2;
   const auto is_noise = [&](const Gap& gap) { return gap.after <= as_noise * gap.known_noise; };
   if (missing.answer == Answer::inner_state || std::ranges::all_of(missing.gaps, is_noise)) return false;
   if (missing.time.in_time && missing.time.independent_share < alike) return true;
@@ -184,11 +193,14 @@ bool leaves_something(const Missing& missing) {
 Missing better_of(Missing found, Missing other, double ratio) {
   const bool may_replace = is_certain(other) || !is_certain(found);
   if (ratio < -likelihood_margin) return found;
-  if (ratio > likelihood_margin) return may_replace ? other : with_rival(std::move(found), other, true);
-  const bool is_tentative = !is_same_function(found, other);
+  if (ratio > likelihood_margin) {
+    return may_replace ? other : with_rival(std::move(found), other, Reason::likelier);
+  }
+  const std::optional<Reason> objection =
+      is_same_function(found, other) ? std::nullopt : std::optional<Reason>(Reason::rival);
   const bool is_simpler = fitted_numbers(other) < fitted_numbers(found);
-  return is_simpler && may_replace ? with_rival(std::move(other), found, is_tentative)
-                                   : with_rival(std::move(found), other, is_tentative);
+  return is_simpler && may_replace ? with_rival(std::move(other), found, objection)
+                                   : with_rival(std::move(found), other, objection);
 }
 
 Missing contested(Missing found, const Terms& terms, const Left& refuted, const CrossValidation& validation,
@@ -206,7 +218,10 @@ Missing contested(Missing found, const Terms& terms, const Left& refuted, const 
       floors(static_cast<Eigen::Index>(o)) = std::max(found.gaps[o].noise_floor, other.gaps[o].noise_floor);
     }
     const double share = std::max(found.time.independent_share, other.time.independent_share);
-    const double ratio = log_likelihood_ratio(validation.errors(found), validation.errors(other), floors, share);
+    // What is uncertain by one of the two answers counts as uncertain.
+    const Eigen::MatrixXd weights = found.weights.cwiseMin(other.weights);
+    const double ratio =
+        log_likelihood_ratio(validation.errors(found, weights), validation.errors(other, weights), floors, share);
     found = better_of(std::move(found), std::move(other), ratio);
   }
   return found;

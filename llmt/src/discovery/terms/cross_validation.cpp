@@ -25,7 +25,7 @@ CrossValidation::CrossValidation(const Simulation& simulation, const Inputs& inp
            .stretches = {}};
 }
 
-Eigen::MatrixXd CrossValidation::errors(const Missing& answer) const {
+Eigen::MatrixXd CrossValidation::errors(const Missing& answer, const Eigen::MatrixXd& weights) const {
   constexpr Eigen::Index folds = 5;
   constexpr Eigen::Index stretches = 2 * folds;
   Simulation simulation = *simulation_;
@@ -39,6 +39,7 @@ Eigen::MatrixXd CrossValidation::errors(const Missing& answer) const {
     placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
   }
   TermData data = data_;
+  if (weights.size() > 0) data.weights = std::make_shared<const Eigen::MatrixXd>(weights);
   for (std::size_t o = 0; o < answer.gaps.size(); ++o) {
     if (answer.gaps[o].noise_floor > 0.0) data.sigma(static_cast<Eigen::Index>(o)) = answer.gaps[o].noise_floor;
   }

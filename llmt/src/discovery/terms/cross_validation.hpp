@@ -20,8 +20,8 @@ class CrossValidation {
   CrossValidation(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                   const std::vector<ModelTerm>& terms, const SearchedRows& rows, const MissingOptions& options);
 
-  /// samples x d: measured minus predicted.
-  Eigen::MatrixXd errors(const Missing& answer) const;
+  /// samples x d: measured minus predicted, times roots of `weights` of rows (n x d, or empty).
+  Eigen::MatrixXd errors(const Missing& answer, const Eigen::MatrixXd& weights) const;
 
  private:
   const Simulation* simulation_;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "discovery/terms/decision.hpp"
 #include "discovery/terms/standstill.hpp"
 #include "llmt/discovery/terms.hpp"
 
@@ -58,12 +59,13 @@ void correct_estimates(ErrorsOfInputs& errors, const TermData& kept, TermFit& fi
 }
 
 void doubt_uncorrected(const ErrorsOfInputs& errors, Missing& missing) {
-  for (FoundTerm& found : missing.found) {
+  for (std::size_t k = 0; k < missing.found.size(); ++k) {
+    const FoundTerm& found = missing.found[k];
     std::string label = found.family;
     if (!found.location.empty()) label += " " + found.location;
     if (missing.gaps.size() > 1) label += " on " + found.output;
     if (std::ranges::find(errors.uncorrected, label) == errors.uncorrected.end()) continue;
-    found.confirmed = false;
+    object(missing, Reason::errors_of_inputs, {k});
     missing.notes.push_back(
         fmt::format("{}: errors of the inputs are more than half of it, so they alone could make this term", label));
   }

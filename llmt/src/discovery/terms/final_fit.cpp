@@ -52,9 +52,10 @@ RowSplit with_samples(const RowSplit& split, const std::vector<bool>& kept) {
 std::optional<RowSplit> without_outliers(const TermModel& model, const MeasuredOutputs& measured,
                                          const Missing& missing, const Eigen::VectorXd& parameters,
                                          const std::vector<PlacedTerm>& placed, const RowSplit& split) {
-  const Eigen::MatrixXd left =
+  Eigen::MatrixXd left =
       (means_of_filtered(measured.values, split.searched) - means(model.predict(parameters, placed), split.searched))
           .cwiseAbs();
+  if (missing.weights.size() > 0) left.array() *= means_of_filtered(missing.weights, split.searched).array();
   const std::set<Eigen::Index> outliers(missing.outliers.begin(), missing.outliers.end());
   std::vector<bool> kept(left.rows(), true);
   for (Eigen::Index i = 0; i < left.rows(); ++i) {
@@ -101,6 +102,8 @@ void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const M
                 .sigma = Eigen::VectorXd::Ones(measured.values.cols()),
                 .stretches = split.stretches,
                 .independent_share = missing.time.independent_share};
+  const KnownErrors known{errors.noise.get(), measured.noise};
+  if (known.can_weigh(data)) weigh(model, {start, {}, placed, {}}, known, {}, data);
   data.sigma = scatter(model, data, {start, {}, placed, {}});
   hold(model, data, start, placed);
   TermFit fit = fit_terms(model, data, start, placed);

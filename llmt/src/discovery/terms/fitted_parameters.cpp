@@ -137,9 +137,7 @@ void describe_parameters(const ParameterFits& fits, const DistinctParameters& di
   // Beside n values of an output, k / d parameters were fitted to it.
   const double statistic = std::max(0.0, (independent - k / d) * ratio);
   const double chance = boost::math::cdf(boost::math::complement(boost::math::chi_squared(k), statistic));
-  if (missing.answer == Answer::nothing_missing && missing.parameter_gain > 0.0 && chance < false_alarm_rate) {
-    missing.answer = Answer::parameters_only;
-  }
+  missing.parameters_explain = missing.parameter_gain > 0.0 && chance < false_alarm_rate;
 }
 
 }  // namespace llmt::discovery

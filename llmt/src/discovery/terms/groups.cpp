@@ -11,6 +11,7 @@
 
 #include "discovery/search/workspace.hpp"
 #include "discovery/terms/cross_validation.hpp"
+#include "discovery/terms/decision.hpp"
 #include "discovery/terms/term_question.hpp"
 
 namespace llmt::discovery {
@@ -132,7 +133,6 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
       }
     }
     add_rivals(std::move(members), found);
-    if (missing.answer == Answer::named && !found.rivals.empty()) missing.answer = Answer::indistinguishable;
     if (!differing) continue;
     Eigen::Index place_of_most = 0;
     (differing->function - own.function).cwiseAbs().maxCoeff(&place_of_most);
@@ -142,8 +142,9 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
         "{} is tentative: {} explains these rows as well and differs from it by {:.0f} % of what it adds, most at {}; "
         "rows like that one tell them apart",
         name_of(own_term), name_of(other), 100.0 * farthest, where(model, own_term, other, row)));
-    found.confirmed = false;
+    object(missing, Reason::rival, {k});
   }
+  decide(missing);
 }
 
 }  // namespace llmt::discovery

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 
 #include "discovery/terms/derivatives.hpp"
+#include "discovery/terms/memory_terms.hpp"
 #include "discovery/terms/motion.hpp"
 #include "discovery/terms/resonance.hpp"
 #include "discovery/terms/surrogate.hpp"
@@ -150,7 +152,8 @@ ModelTerm resonance(const std::string& output, std::vector<double> frequencies) 
           .columns = [](const Rows& rows, const Eigen::VectorXd& constants) -> Eigen::MatrixXd {
             constexpr double least = 1e-3;
             constexpr double most = 0.2;  // more is a filter: it hardly rings
-            return -resonant_part(rows, std::max(constants(0), 1e-300), std::clamp(constants(1), least, most));
+            return -resonant_part(rows, rows.simulated, std::max(constants(0), 1e-300),
+                                  std::clamp(constants(1), least, most));
           },
           .constants = {constant("frequency", "per unit of time", std::move(frequencies)),
                         constant("damping ratio", "1", {0.02, 0.04, 0.08, 0.16})},
@@ -257,6 +260,7 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
       terms.back().lower = Eigen::VectorXd::Zero(1);
       terms.back().upper = Eigen::VectorXd::Ones(1);
     }
+    std::ranges::move(memory_terms(inputs, rows, all, outputs[o]), std::back_inserter(terms));
     if (surrogate->described()(place) < described) continue;
     // The spring's term holds the second derivative of the simulated output, which should not be noise.
     if (noise_of_second(of_rows->at(rows, inputs.values), rows, parts_of(*surrogate, here, place).smooth) >

@@ -50,8 +50,8 @@ Eigen::VectorXd stacked(const TermData& data, const Eigen::MatrixXd& of_rows) {
   const Eigen::MatrixXd of_samples = means(of_rows, data.samples);
   const Eigen::Index d = data.measured.cols();
   Eigen::VectorXd all(data.measured.size());
-  for (Eigen::Index i = 0; i < of_samples.rows(); ++i) {
-    all.segment(i * d, d) = of_samples.row(i).transpose().cwiseQuotient(data.sigma);
+  for (Eigen::Index o = 0; o < d; ++o) {
+    all(Eigen::seqN(o, of_samples.rows(), d)) = of_samples.col(o).cwiseProduct(weights_of(data, o)) / data.sigma(o);
   }
   return all;
 }
@@ -170,7 +170,7 @@ Eigen::MatrixXd covariance_of_errors(const Rows& rows, const Inputs& inputs) {
 
 InputNoise::InputNoise(const TermModel& model, const Inputs& inputs, const Eigen::MatrixXd& simulated,
                        const Eigen::MatrixXd& covariance)
-    : model_(&model), surrogate_(inputs.values, simulated) {
+    : model_(&model), inputs_(&inputs), surrogate_(inputs.values, simulated) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
   const Eigen::MatrixXd root =
       axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * axes.eigenvectors().transpose();
@@ -218,7 +218,9 @@ Eigen::VectorXd InputNoise::moment_correction(const TermData& data, const Placed
   for (const std::shared_ptr<const Draw>& draw : draws_) {
     if (at_samples) {
       const Eigen::MatrixXd moved = draw->model->columns_at(placed, simulated + draw->change, data.samples.rows());
-      const Eigen::VectorXd twice = means(draw->filtered.col(placed.output), data.samples);
+      Eigen::VectorXd filtered = draw->filtered.col(placed.output);
+      if (data.weights) filtered.array() *= data.weights->col(placed.output).array().square();
+      const Eigen::VectorXd twice = means(filtered, data.samples);
       if (moved.allFinite()) sum += moved.transpose() * twice / std::pow(data.sigma(placed.output), 2.0);
       continue;
     }
@@ -331,11 +333,17 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
   return beyond;
 }
 
-Eigen::VectorXd InputNoise::variances(const Samples& samples) const {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(draws_.front()->change.cols());
-  for (const std::shared_ptr<const Draw>& draw : draws_) {
-    sum += means(draw->change, samples).cwiseAbs2().colwise().mean().transpose();
-  }
+Eigen::MatrixXd InputNoise::variances(const TermFit& fit) const {
+  const Eigen::MatrixXd as_given = model_->predict(fit.parameters, fit.placed);
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(as_given.rows(), as_given.cols());
+  for (const std::shared_ptr<const Draw>& draw : draws_)
+    sum += as_measured(*inputs_, draw->model->predict(fit.parameters, fit.placed) - as_given).cwiseAbs2();
+  return sum / static_cast<double>(draws_.size());
+}
+
+Eigen::MatrixXd InputNoise::variances(const Samples& samples) const {
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(samples.size(), draws_.front()->change.cols());
+  for (const std::shared_ptr<const Draw>& draw : draws_) sum += means(draw->change, samples).cwiseAbs2();
   return sum / static_cast<double>(draws_.size());
 }
 

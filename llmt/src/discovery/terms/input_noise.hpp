@@ -48,12 +48,15 @@ class InputNoise {
 
   /// d: share of the variance of the simulation that the surrogate describes.
   const Eigen::VectorXd& described() const { return surrogate_.described(); }
-  /// d: mean square of what the errors add to the simulated outputs of samples.
-  Eigen::VectorXd variances(const Samples& samples) const;
+  /// Rows x d: mean square of what the errors add to the prediction of a fit, as it is measured.
+  Eigen::MatrixXd variances(const TermFit& fit) const;
+  /// Samples x d: mean square of what the errors add to the simulated outputs.
+  Eigen::MatrixXd variances(const Samples& samples) const;
 
  private:
   struct Draw;
   const TermModel* model_;
+  const Inputs* inputs_;
   Surrogate surrogate_;
   std::vector<std::shared_ptr<const Draw>> draws_;
 };

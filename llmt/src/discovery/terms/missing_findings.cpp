@@ -1,13 +1,12 @@
 #include "discovery/terms/missing_findings.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "discovery/terms/approximations.hpp"
+#include "discovery/terms/derivatives.hpp"
 #include "discovery/terms/input_noise.hpp"
 #include "discovery/terms/outliers.hpp"
 #include "discovery/terms/structure.hpp"
@@ -20,6 +19,23 @@ std::string unit_of(const std::string& output, const std::string& per) {
   if (per.empty()) return output;
   if (per.starts_with("simulated")) return output + "/" + output + per.substr(std::string("simulated").size());
   return output + "/" + per;
+}
+
+// What a filtered input changes by from row to row where it passes 0, in the middle of all such steps; 0: not known.
+double step_across_zero(const Inputs& inputs, Eigen::Index column) {
+  std::vector<double> steps;
+  if (!(inputs.cutoff > 0.0)) return 0.0;
+  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
+  const std::vector<Recorded> recorded = recordings(rows);
+  for (std::size_t k = 1; k < rows.sequence.size(); ++k) {
+    const double before = inputs.values(rows.sequence[k - 1], column);
+    const double now = inputs.values(rows.sequence[k], column);
+    if (recorded[k].begin == recorded[k - 1].begin && before * now < 0.0) steps.push_back(std::abs(now - before));
+  }
+  if (steps.empty()) return 0.0;
+  const auto middle = steps.begin() + std::ssize(steps) / 2;
+  std::ranges::nth_element(steps, middle);
+  return *middle;
 }
 
 FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eigen::VectorXd& errors) {
@@ -136,8 +152,12 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
   }
   std::vector<Structure> all;
   for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
-    const Eigen::VectorXd left = data.measured.col(o) - means_of_filtered(missing.corrected.col(o), data.samples);
-    const Eigen::VectorXd gap = data.measured.col(o) - means_of_filtered(missing.before.col(o), data.samples);
+    const auto without = [&](const Eigen::MatrixXd& predicted) -> Eigen::VectorXd {
+      const Eigen::VectorXd own = data.measured.col(o) - means_of_filtered(predicted.col(o), data.samples);
+      return own.cwiseProduct(weights_of(data, o));
+    };
+    const Eigen::VectorXd left = without(missing.corrected);
+    const Eigen::VectorXd gap = without(missing.before);
     const StructureLeft found = structure_left(samples, left, data.stretches, data.independent_share);
     const double common = found.share * left.squaredNorm();
     const double explained = std::max(0.0, gap.squaredNorm() - left.squaredNorm());
@@ -151,64 +171,6 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
     all.push_back(std::move(structure));
   }
   return all;
-}
-
-void decide(Missing& missing, bool in_time) {
-  const bool is_nothing = missing.verdict.answer == Answer::nothing_missing;
-  missing.answer = is_nothing && !missing.structure.empty() ? Answer::unknown : missing.verdict.answer;
-  constexpr double certain = 2.0;  // standard errors
-  const auto is_state = [](const FoundTerm& found) {
-    return !found.inner_state.empty() &&
-           std::abs(found.values.front().value) > certain * found.values.front().standard_error;
-  };
-  const bool has_inner_state = std::ranges::any_of(missing.found, is_state);
-  if (has_inner_state) missing.answer = Answer::inner_state;
-  if (!missing.failing_rows.empty()) missing.answer = Answer::failed_held_out;
-  const std::vector<bool> approximate = approximations(missing.found, in_time);
-  std::set<std::vector<std::string>> noted;
-  for (std::size_t k = 0; k < missing.found.size(); ++k) {
-    FoundTerm& found = missing.found[k];
-    const bool is_beside_structure =
-        std::ranges::find(missing.structure, found.output, &Structure::output) != missing.structure.end();
-    found.confirmed = missing.answer != Answer::failed_held_out && missing.verdict.answer != Answer::unknown &&
-                      !found.generic && !approximate[k] && !is_beside_structure && found.shrinks_gap;
-    if (!found.inner_state.empty() && !is_state(found)) found.confirmed = false;
-    if (!approximate[k] || found.inputs.empty() || !noted.insert(sorted_inputs(found)).second) continue;
-    const std::string inputs = fmt::format("{}", fmt::join(sorted_inputs(found), " and "));
-    missing.notes.push_back("there are many terms of " + inputs +
-                            ": together they may approximate one that was not tried");
-  }
-}
-
-void demand_certainty(Missing& missing) {
-  const bool is_named = missing.answer == Answer::named || missing.answer == Answer::indistinguishable;
-  if (is_named && !std::ranges::all_of(missing.found, &FoundTerm::confirmed)) missing.answer = Answer::unknown;
-}
-
-void confirm_together(Missing& missing) {
-  std::set<Eigen::Index> doubtful;
-  for (const FoundTerm& found : missing.found) {
-    if (!found.confirmed) doubtful.insert(found.output_index);
-  }
-  for (FoundTerm& found : missing.found) found.confirmed = !doubtful.contains(found.output_index);
-}
-
-void bound_by_noise(Missing& missing) {
-  constexpr double far = 5.0;
-  const bool is_clear = missing.answer == Answer::nothing_missing || missing.answer == Answer::parameters_only;
-  for (const Gap& gap : missing.gaps) {
-    if (!(gap.after > far * gap.known_noise)) continue;
-    if (is_clear) {
-      missing.answer = Answer::undecided;
-      missing.visible.clear();  // what is left would hide them
-    }
-    for (FoundTerm& found : missing.found) {
-      if (found.output == gap.output && found.inner_state.empty()) found.confirmed = false;
-    }
-    missing.notes.push_back(fmt::format(
-        "what is left of {} is {:.3g} times its known noise ({:.2g}): {}", gap.output, gap.after / gap.known_noise,
-        gap.known_noise, missing.found.empty() ? "no term tried explains it" : "something more is missing"));
-  }
 }
 
 std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector<ModelTerm>& terms) {
@@ -244,7 +206,8 @@ std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::ve
   for (const FoundTerm& found : missing.found) {
     if (!has_width(found)) continue;
     const auto column = std::ranges::find(inputs.names, found.inputs.front()) - inputs.names.begin();
-    const double least = std::max(visible * std::sqrt(variance(column)), smoothed_away * of_smoothed(column));
+    const double least = std::max(
+        {visible * std::sqrt(variance(column)), smoothed_away * of_smoothed(column), step_across_zero(inputs, column)});
     if (std::abs(found.constants(0)) < least) narrow.insert(found.term);
   }
   return narrow;

@@ -36,25 +36,6 @@ void describe_limits(const Settled& settled, const TermData& data, Missing& miss
 std::vector<Structure> structure_beside(const TermModel& model, const TermData& data, const Inputs& inputs,
                                         const Eigen::VectorXd& errors, const Missing& missing);
 
-/// Missing::answer, and which terms are confirmed:
-///
-/// - the answer is that of the search; but "unknown" where the search found nothing and structure is left, and where a
-///   term is not confirmed; and "failed on held-out rows" where the terms make the error on samples set aside larger;
-/// - a term is confirmed if it is a cause, the search found no shapes, no structure is left in its output, and it is
-///   not one of many terms of its inputs, which together may only approximate another function, and it shrinks the
-///   error on the samples set aside.
-void decide(Missing& missing, bool in_time);
-
-/// An answer has a bound from outside: where more is left of an output than some times its known noise, "nothing is
-/// missing" and "parameters only" become "undecided", and the terms of the output are not confirmed.
-void bound_by_noise(Missing& missing);
-
-/// What is named is certain: with a term that is not confirmed the answer is "unknown".
-void demand_certainty(Missing& missing);
-
-/// The terms of an output are confirmed together: beside one that is tentative, another may stand for a part of it.
-void confirm_together(Missing& missing);
-
 /// The indices in `terms` of those terms of a state that were found with a frequency at an end of those tried, or with
 /// a damping ratio that is not below the largest tried by two standard errors: a filter, no machine, has such
 /// constants.
@@ -62,7 +43,8 @@ std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector
 
 /// The indices in `terms` of those that were found with a width below 4 standard deviations of the errors of their
 /// input: the errors smear what is so narrow, and it follows single rows. Where the input was smoothed, whose errors
-/// before are `of_smoothed`, 2 of these count as well: the simulation saw them.
+/// before are `of_smoothed`, 2 of these count as well: the simulation saw them. In filtered rows what the input changes
+/// by from row to row where it passes 0 counts too: no row need stand in a peak that is narrower.
 std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::vector<ModelTerm>& terms,
                                            const Inputs& inputs, const Eigen::VectorXd& of_smoothed);
 

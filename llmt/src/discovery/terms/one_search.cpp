@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "discovery/terms/correlation.hpp"
+#include "discovery/terms/decision.hpp"
 #include "discovery/terms/errors_of_inputs.hpp"
 #include "discovery/terms/fitted_parameters.hpp"
 #include "discovery/terms/held_out.hpp"
@@ -56,12 +57,18 @@ double correlation_time(const RowSplit& split, const Eigen::MatrixXd& deviations
 
 // Of the samples: the noise of an output, and what errors of the inputs do to the simulation.
 void set_known_noise(const MeasuredOutputs& measured, const ErrorsOfInputs& errors, const RowSplit& split,
-                     Missing& missing) {
+                     const TermData& data, Missing& missing) {
   if (measured.noise.size() == 0) return;
-  Eigen::VectorXd variances = measured.noise.cwiseAbs2() / static_cast<double>(split.rows_per_sample);
-  if (errors.noise) variances += errors.noise->variances(split.searched);
-  for (std::size_t o = 0; o < missing.gaps.size(); ++o) {
-    missing.gaps[o].known_noise = std::sqrt(variances(static_cast<Eigen::Index>(o)));
+  for (std::size_t k = 0; k < missing.gaps.size(); ++k) {
+    const auto o = static_cast<Eigen::Index>(k);
+    const double noise = measured.noise(o) * measured.noise(o) / static_cast<double>(split.rows_per_sample);
+    Eigen::VectorXd variances = Eigen::VectorXd::Constant(split.searched.size(), noise);
+    if (data.known_variances) {
+      variances = means_of_filtered(data.known_variances->col(o), split.searched);
+    } else if (errors.noise) {
+      variances += errors.noise->variances(split.searched).col(o);
+    }
+    missing.gaps[k].known_noise = std::sqrt(variances.cwiseProduct(weights_of(data, o).cwiseAbs2()).mean());
   }
 }
 
@@ -102,7 +109,8 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   TermFit baseline = fit_terms(model, data, start, {});
   data.sigma = scatter(model, data, baseline);
   if (d > 1) baseline = fit_terms(model, data, start, {});
-  Settled settled = search_terms(model, data, split.repeats, baseline, errors.noise.get(), options, work);
+  Settled settled =
+      search_terms(model, data, split.repeats, baseline, {errors.noise.get(), measured.noise}, options, work);
   correct_estimates(errors, without_samples(data, settled.verdict.outliers), settled.fit);
 
   Missing missing;
@@ -134,25 +142,27 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   if (errors.noise && !in_time) missing.structure.clear();
   TermData aside = data_of(split.held_out, measured);
   aside.sigma = data.sigma;
+  aside.weights = data.weights;
+  missing.weights = data.weights ? *data.weights : Eigen::MatrixXd();
   judge_held_out(model, kept, aside, baseline, settled, in_time ? errors.noise.get() : nullptr, missing);
   if (in_time) find_states_of_outputs(inputs, measured, missing);
   missing.notes.insert(missing.notes.end(), errors.notes.begin(), errors.notes.end());
-  decide(missing, in_time);
+  judge_findings(missing, in_time);
   doubt_uncorrected(errors, missing);
-  demand_certainty(missing);
   describe_parameters({model, kept, start, baseline, settled.fit}, sums, options.search.false_alarm_rate, missing);
   missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
   const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;
   for (Eigen::Index o = 0; o < d; ++o) {
     const Eigen::VectorXd before = measured.values.col(o) - missing.before.col(o);
     const Eigen::VectorXd after = measured.values.col(o) - missing.corrected.col(o);
-    const auto aside_of = [&](const Eigen::VectorXd& rows) { return means_of_filtered(rows, split.held_out); };
+    const auto aside_of = [&](const Eigen::VectorXd& rows) -> Eigen::VectorXd {
+      return means_of_filtered(rows, split.held_out).cwiseProduct(weights_of(aside, o));
+    };
     missing.gaps.push_back(gap_of(measured.names[o], aside_of(measured.values.col(o) - nominal.col(o)),
                                   aside_of(before), aside_of(after), noise * data.sigma(o)));
   }
-  set_known_noise(measured, errors, split, missing);
-  bound_by_noise(missing);
-  demand_certainty(missing);
+  set_known_noise(measured, errors, split, data, missing);
+  judge_noise(missing);
   if (in_time) {
     missing.time = {.in_time = true,
                     .found_out = false,
@@ -162,8 +172,10 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
                     .independent_share = data.independent_share,
                     .correlation_time = correlation_time(split, measured.values - missing.corrected)};
   }
+  decide(missing);
   if (missing.answer == Answer::nothing_missing && is_drift(missing)) {
-    missing.answer = Answer::unknown;
+    object(missing, Reason::drift);
+    decide(missing);
     missing.visible.clear();  // beside a drift no term could be seen
     missing.notes.emplace_back(
         "what is left may be a drift, a term that was not tried, or one that varies as slowly: record longer, or with "

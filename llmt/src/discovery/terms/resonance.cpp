@@ -61,17 +61,17 @@ class Oscillator {
 
 }  // namespace
 
-Eigen::VectorXd resonant_part(const Rows& rows, double frequency, double damping) {
+Eigen::VectorXd resonant_part(const Rows& rows, const Eigen::VectorXd& signal, double frequency, double damping) {
   const double longest = std::max(1.0 / frequency, interruption * median_step(rows));
   Oscillator oscillator(frequency, damping);
-  Eigen::VectorXd part(rows.simulated.size());
+  Eigen::VectorXd part(signal.size());
   for (std::size_t k = 0; k < rows.sequence.size(); ++k) {
     const Eigen::Index row = rows.sequence[k];
-    const double now = rows.simulated(row);
+    const double now = signal(row);
     const Eigen::Index before = k > 0 ? rows.sequence[k - 1] : row;
     const double duration = rows.instants(row) - rows.instants(before);
     if (duration > 0.0 && duration <= longest) {
-      oscillator.step(rows.simulated(before), now, duration);
+      oscillator.step(signal(before), now, duration);
     } else {
       oscillator.rest(now);
     }

@@ -68,6 +68,33 @@ Eigen::MatrixXd RowFilter::operator()(const Eigen::MatrixXd& of_rows) const {
   return filtered;
 }
 
+Eigen::MatrixXd squared_errors_of_steps(const Inputs& inputs, const Eigen::MatrixXd& of_rows) {
+  constexpr Eigen::Index fewest = 4;  // rows in an independent one, of which half are left
+  constexpr double order = 3.0;       // 2^2 - 1
+  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(of_rows.rows(), of_rows.cols());
+  const RowFilter filter(inputs);
+  if (filter.stride() < fewest) return squares;
+  std::vector<Eigen::Index> kept;
+  std::vector<Eigen::Index> next;  // the row left out after it, or itself
+  for (const std::vector<Eigen::Index>& piece : filter.pieces()) {
+    for (std::size_t k = 0; k < piece.size(); k += 2) {
+      kept.push_back(piece[k]);
+      next.push_back(piece[std::min(k + 1, piece.size() - 1)]);
+    }
+  }
+  Inputs half = inputs;
+  half.values = inputs.values(kept, Eigen::all);
+  half.instants = inputs.instants(kept);
+  half.runs.clear();
+  for (const Eigen::Index row : kept) {
+    if (!inputs.runs.empty()) half.runs.push_back(inputs.runs[row]);
+  }
+  const Eigen::MatrixXd change = filter(of_rows)(kept, Eigen::all) - RowFilter(half)(of_rows(kept, Eigen::all));
+  squares(kept, Eigen::all) = (change / order).cwiseAbs2();
+  squares(next, Eigen::all) = squares(kept, Eigen::all).eval();
+  return squares;
+}
+
 Eigen::MatrixXd as_measured(const Inputs& inputs, const Eigen::MatrixXd& of_rows) {
   return inputs.cutoff > 0.0 ? RowFilter(inputs)(of_rows) : of_rows;
 }

@@ -36,6 +36,11 @@ class RowFilter {
   double step_ = 0.0;
 };
 
+/// Squares of the errors of as_measured() where what is computed changes between rows, n x d: a third of the change if
+/// every other row is left out (Richardson 1911), at rows left out that of their neighbour. 0 where rows are too far
+/// apart to leave some out.
+Eigen::MatrixXd squared_errors_of_steps(const Inputs& inputs, const Eigen::MatrixXd& of_rows);
+
 /// What is computed at the rows, as the measured outputs are: filtered if these are.
 Eigen::MatrixXd as_measured(const Inputs& inputs, const Eigen::MatrixXd& of_rows);
 

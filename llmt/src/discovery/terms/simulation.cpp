@@ -23,6 +23,7 @@
 #include "discovery/terms/row_filter.hpp"
 #include "discovery/terms/row_split.hpp"
 #include "discovery/terms/standstill.hpp"
+#include "discovery/terms/surrogate.hpp"
 #include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
@@ -102,7 +103,14 @@ Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const Measur
   const Eigen::MatrixXd simulated = simulation.predict(inputs.values, nominal_values(simulation));
   // What has the wrong shape is refused by the search.
   if (simulated.rows() != measured.values.rows() || simulated.cols() != measured.values.cols()) return inputs;
-  inputs.zero_bands = zero_bands(inputs, measured.values - as_measured(inputs, simulated));
+  // Dry friction jumps where a speed passes 0, that of the simulation beside what it lacks.
+  const Surrogate surrogate(inputs.values, simulated);
+  Eigen::MatrixXd deviations = measured.values - as_measured(inputs, simulated);
+  constexpr double described = 0.9;
+  if (surrogate.described().minCoeff() >= described) {
+    deviations += as_measured(inputs, surrogate.jumps(inputs.values));
+  }
+  inputs.zero_bands = zero_bands(inputs, deviations);
   if (!(inputs.zero_bands.array() > 0.0).any()) inputs.zero_bands.resize(0);
   return inputs;
 }
@@ -140,7 +148,8 @@ Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, cons
       const std::string place = found.location.empty() ? "" : " " + found.location;
       const std::string name = found.generic ? "an error pattern of" + place : found.family + place;
       notes.push_back(name + " was found and taken back: " +
-                      (is_narrow          ? fmt::format("it is narrower than the errors of {}", found.location)
+                      (is_narrow ? fmt::format("it is narrower than the errors of {}, or than its steps between rows",
+                                               found.location)
                        : found.is_refuted ? "it makes the error on rows set aside larger"
                                           : "it does not make the error on rows set aside smaller"));
     }
@@ -238,7 +247,6 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
       return search_once(there, inputs, measured, others, searched, options, left_out);
     };
     missing = contested(std::move(missing), terms, refuted, validation, search);
-    confirm_together(missing);
   }
   fit_on_all_rows(there, inputs, measured, terms, searched, options, missing);
   missing.zero_bands = inputs.zero_bands;

@@ -47,13 +47,14 @@ void keep(const Samples& from, const std::vector<bool>& apart, Samples& to, std:
   }
 }
 
-// The widest band in which rows lie clearly denser than where x passes; 0: none. A signal that passes 0 spends as long
-// in any interval there as in another of the same width.
+// The widest band of at most half of the rows, in which they lie clearly denser than where x passes; 0: none. A signal
+// that passes 0 spends as long in any interval there as in another of the same width.
 double band_of(const Eigen::VectorXd& x) {
   constexpr Eigen::Index fewest = 20;
   constexpr Eigen::Index fewest_beside = 5;
   constexpr double denser = 3.0;
   constexpr double finer = 1.25;
+  constexpr double largest_share = 0.5;
   std::vector<double> sizes(x.size());
   Eigen::VectorXd::Map(sizes.data(), x.size()) = x.cwiseAbs();
   std::ranges::sort(sizes);
@@ -69,6 +70,7 @@ double band_of(const Eigen::VectorXd& x) {
   const double passing = (below(far * spread) - below(near * spread)) / ((far - near) * spread);
   for (double band = widest * spread; band > narrowest * spread; band /= finer) {
     const double outer = below(band) - below(0.5 * band);
+    if (below(band) > largest_share * static_cast<double>(x.size())) continue;
     if (outer >= fewest_beside && outer >= denser * passing * 0.5 * band && below(band) >= fewest &&
         below(band) >= denser * passing * band) {
       return band;
@@ -108,14 +110,12 @@ bool jumps(const Eigen::VectorXd& x, const Eigen::VectorXd& values, double band)
 }  // namespace
 
 Eigen::VectorXd zero_bands(const Inputs& inputs, const Eigen::MatrixXd& deviations) {
-  constexpr double largest_share = 0.5;
   Eigen::VectorXd bands = Eigen::VectorXd::Zero(inputs.values.cols());
   for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
     const Eigen::VectorXd x = inputs.values.col(j);
     if (!(x.minCoeff() < 0.0 && x.maxCoeff() > 0.0) || !is_smooth_in_time(inputs, j)) continue;
     const double band = band_of(x);
-    const auto within = static_cast<double>((x.array().abs() < band).count());
-    if (!(band > 0.0) || within > largest_share * static_cast<double>(x.size())) continue;
+    if (!(band > 0.0)) continue;
     for (Eigen::Index o = 0; o < deviations.cols(); ++o) {
       if (jumps(x, deviations.col(o), band)) bands(j) = band;
     }

@@ -108,6 +108,11 @@ std::string TermModel::label(const PlacedTerm& placed) const {
   return text;
 }
 
+Eigen::VectorXd weights_of(const TermData& data, Eigen::Index output) {
+  if (!data.weights) return Eigen::VectorXd::Ones(data.samples.size());
+  return means_of_filtered(data.weights->col(output), data.samples);
+}
+
 Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
                                  const std::vector<PlacedTerm>& placed) {
   const Eigen::MatrixXd& simulated = model.simulated(parameters);
@@ -117,8 +122,9 @@ Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, c
   }
   const Eigen::Index d = data.measured.cols();
   Eigen::VectorXd residuals(data.measured.size());
-  for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
-    residuals.segment(i * d, d) = (data.measured.row(i) - predicted.row(i)).transpose().cwiseQuotient(data.sigma);
+  for (Eigen::Index o = 0; o < d; ++o) {
+    residuals(Eigen::seqN(o, data.measured.rows(), d)) =
+        (data.measured.col(o) - predicted.col(o)).cwiseProduct(weights_of(data, o)) / data.sigma(o);
   }
   return residuals;
 }
@@ -141,9 +147,8 @@ Eigen::MatrixXd stacked_signature(const TermModel& model, const TermData& data, 
   const Eigen::MatrixXd of_samples = model.means_of(placed, simulated, data.samples);
   const Eigen::Index d = data.measured.cols();
   Eigen::MatrixXd signature = Eigen::MatrixXd::Zero(data.measured.size(), of_samples.cols());
-  for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
-    signature.row(i * d + placed.output) = of_samples.row(i) / data.sigma(placed.output);
-  }
+  const Eigen::VectorXd scale = weights_of(data, placed.output) / data.sigma(placed.output);
+  signature(Eigen::seqN(placed.output, data.measured.rows(), d), Eigen::all) = scale.asDiagonal() * of_samples;
   return signature;
 }
 

@@ -56,6 +56,7 @@ class TermModel {
   /// n x d.
   Eigen::MatrixXd predict(const Eigen::VectorXd& values, const std::vector<PlacedTerm>& placed) const;
 
+  const Inputs& inputs() const { return *inputs_; }
   /// Values of an input. Throws std::invalid_argument if there is none of that name.
   Eigen::VectorXd input(const std::string& name) const;
 
@@ -81,11 +82,16 @@ class TermModel {
 /// Samples that are fitted, measured outputs there, and how much an output's deviation counts.
 struct TermData {
   Samples samples;
-  Eigen::MatrixXd measured;             // samples x d
-  Eigen::VectorXd sigma;                // d
-  std::vector<Eigen::Index> stretches;  // RowSplit::stretches; empty: samples are not in time
-  double independent_share = 1.0;       // of the samples, see search()
+  Eigen::MatrixXd measured;                                     // samples x d
+  Eigen::VectorXd sigma;                                        // d
+  std::vector<Eigen::Index> stretches;                          // RowSplit::stretches; empty: samples are not in time
+  double independent_share = 1.0;                               // of the samples, see search()
+  std::shared_ptr<const Eigen::MatrixXd> weights = {};          // roots, of rows x d, see weigh(); none: all 1
+  std::shared_ptr<const Eigen::MatrixXd> known_variances = {};  // of the errors of rows x d; none: see weigh()
 };
+
+/// Roots of the weights of the samples of an output.
+Eigen::VectorXd weights_of(const TermData& data, Eigen::Index output);
 
 /// Parameters and placed terms fitted together.
 struct TermFit {
@@ -115,7 +121,7 @@ std::vector<std::vector<double>> correlations_of(const TermData& data, const Eig
 /// The first row with a value that is not finite, or the number of rows.
 Eigen::Index first_bad_row(const Eigen::MatrixXd& values);
 
-/// (measured - predicted) / sigma, stacked sample by sample.
+/// (measured - predicted) weight / sigma, stacked sample by sample.
 Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
                                  const std::vector<PlacedTerm>& placed);
 

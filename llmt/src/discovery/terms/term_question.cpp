@@ -30,6 +30,7 @@ EffectCandidate candidate_of(const TermModel& model, const TermData& data, const
     constexpr double far = 2.0;
     candidate.lower = Eigen::VectorXd::Constant(candidate.signature.cols(), 1.0 / far);
     candidate.upper = Eigen::VectorXd::Constant(candidate.signature.cols(), far);
+    candidate.family = "delay";  // a lag is another form of it: an output has one of them
   }
   candidate.generic = term.generic;
   candidate.prior_cost = option.prior_cost;
@@ -129,7 +130,8 @@ TermData without_samples(const TermData& data, const std::vector<std::size_t>& l
   for (Eigen::Index i = 0; i < data.samples.size(); ++i) {
     if (std::ranges::find(left_out, static_cast<std::size_t>(i)) == left_out.end()) kept.push_back(i);
   }
-  TermData result{{}, data.measured(kept, Eigen::all), data.sigma, {}, data.independent_share};
+  TermData result{
+      {}, data.measured(kept, Eigen::all), data.sigma, {}, data.independent_share, data.weights, data.known_variances};
   for (const Eigen::Index i : kept) {
     result.samples.add(data.samples, i);
     if (!data.stretches.empty()) result.stretches.push_back(data.stretches[i]);
@@ -162,6 +164,8 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   const Rivals rivals(model, data, fit, outliers);
   std::vector<PlacedTerm> of_regimes;
   double trials_of_regimes = 0.0;
+  std::vector<PlacedTerm> of_states;
+  double trials_of_states = 0.0;
   for (std::size_t t = 0; t < model.terms().size(); ++t) {
     const ModelTerm& term = model.terms()[t];
     if (model.is_refuted(t)) continue;
@@ -178,6 +182,11 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
           std::ranges::move(options, std::back_inserter(of_regimes));
           continue;
         }
+        if (ColumnCache::is_state_of_inputs(term)) {
+          trials_of_states += 1.0;
+          std::ranges::move(options, std::back_inserter(of_states));
+          continue;
+        }
         for (PlacedTerm& option : rivals.options(t, o, simulated)) options.push_back(std::move(option));
       } else if (!placed_already(fit.placed, t, o)) {
         options.push_back({t, o, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0});
@@ -188,16 +197,21 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
       }
     }
   }
-  // Of the many terms times thresholds only those compete that explain most; each is the best of so many.
+  // Of many that are alike only those compete that explain most; each is the best of so many.
+  const auto add_best = [&](std::vector<PlacedTerm> options, std::size_t most, double trials) {
+    std::ranges::stable_sort(options, std::greater<>{}, &PlacedTerm::explained);
+    options.resize(std::min(most, options.size()));
+    for (PlacedTerm& option : options) {
+      option.prior_cost += 2.0 * std::log(trials / static_cast<double>(options.size()));
+      question.candidates.push_back(candidate_of(model, data, option, simulated, slots.next(model, option), noise));
+      question.options.push_back(std::move(option));
+    }
+  };
   constexpr std::size_t most_of_regimes = 20;
-  std::ranges::stable_sort(of_regimes, std::greater<>{}, &PlacedTerm::explained);
-  const std::size_t kept = std::min(most_of_regimes, of_regimes.size());
-  for (std::size_t k = 0; k < kept; ++k) {
-    PlacedTerm& option = of_regimes[k];
-    option.prior_cost = 2.0 * std::log(trials_of_regimes / static_cast<double>(kept));
-    question.candidates.push_back(candidate_of(model, data, option, simulated, slots.next(model, option), noise));
-    question.options.push_back(std::move(option));
-  }
+  constexpr std::size_t most_of_states = 5;
+  for (PlacedTerm& option : of_regimes) option.prior_cost = 0.0;  // the constants are counted among the trials
+  add_best(std::move(of_regimes), most_of_regimes, trials_of_regimes);
+  add_best(std::move(of_states), most_of_states, trials_of_states);
   return question;
 }
 

@@ -47,18 +47,22 @@ double share_of_independent(const TermModel& model, const TermData& data, const 
 
 // The weights of the outputs, and the share of the samples that is independent, follow what each round leaves.
 Settled search_until_settled(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
-                             Settled settled, bool with_history, const InputNoise* noise, const MissingOptions& options,
-                             Work& work) {
+                             Settled settled, bool with_history, const KnownErrors& errors,
+                             const MissingOptions& options, Work& work) {
   const bool in_time = !data.stretches.empty();
   constexpr int fewest_in_time = 8;
   const RoundLimits limits{.most = in_time ? std::max(options.rounds, fewest_in_time) : options.rounds,
                            .stop_at_repeat = in_time};
+  Eigen::VectorXd spread;
+  if (errors.can_weigh(data)) {
+    spread = weigh(model, settled.fit, errors, {}, data);
+  }
   until_settled(limits, settled.rounds > 0 ? summary_of(settled) : RoundSummary{}, [&](int) {
     if (settled.rounds > 0 && data.sigma.size() > 1) {
       data.sigma = scatter(model, without_samples(data, settled.verdict.outliers), settled.fit);
     }
     work.begin(fmt::format("searching, round {}", ++settled.rounds));
-    settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers, with_history, noise);
+    settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers, with_history, errors.of_inputs);
     settled.verdict = search(settled.question.evidence, settled.question.candidates, options.search);
     work.did(share_of_half_a_round * work.left());
     const TermData kept = without_samples(data, settled.verdict.outliers);
@@ -75,6 +79,12 @@ Settled search_until_settled(const TermModel& model, TermData& data, const std::
       constexpr double same = 0.1;
       summary.may_be_last = std::abs(share - data.independent_share) <= same * data.independent_share;
       data.independent_share = share;
+      if (errors.can_weigh(data)) {
+        const Eigen::VectorXd before = spread;
+        spread = weigh(model, settled.fit, errors, settled.verdict.outliers, data);
+        summary.may_be_last =
+            summary.may_be_last && (spread - before).cwiseAbs().maxCoeff() <= same * before.maxCoeff();
+      }
     }
     return summary;
   });
@@ -93,24 +103,20 @@ bool needs_history(const TermModel& model, const Settled& plain, const Settled& 
 }  // namespace
 
 Eigen::VectorXd scatter(const TermModel& model, const TermData& data, const TermFit& fit) {
-  const Eigen::MatrixXd predicted = means(model.predict(fit.parameters, fit.placed), data.samples);
-  Eigen::VectorXd sigma(data.measured.cols());
-  for (Eigen::Index o = 0; o < sigma.size(); ++o) {
-    const Eigen::VectorXd left = data.measured.col(o) - predicted.col(o);
-    sigma(o) = std::sqrt(left.squaredNorm() / static_cast<double>(left.size()));
-    if (!(sigma(o) > 0.0)) sigma(o) = 1.0;
-  }
+  Eigen::VectorXd sigma =
+      weighted_rms(data.measured - means(model.predict(fit.parameters, fit.placed), data.samples), data);
+  for (double& own : sigma) own = own > 0.0 ? own : 1.0;
   return sigma;
 }
 
 Settled search_terms(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
-                     const TermFit& baseline, const InputNoise* noise, const MissingOptions& options, Work& work) {
+                     const TermFit& baseline, const KnownErrors& errors, const MissingOptions& options, Work& work) {
   Settled settled;
   settled.fit = baseline;
-  settled = search_until_settled(model, data, repeats, std::move(settled), false, noise, options, work);
+  settled = search_until_settled(model, data, repeats, std::move(settled), false, errors, options, work);
   if (data.stretches.empty() && std::ranges::any_of(model.terms(), &ModelTerm::history)) {
     TermData again = data;
-    const Settled other = search_until_settled(model, again, repeats, settled, true, noise, options, work);
+    const Settled other = search_until_settled(model, again, repeats, settled, true, errors, options, work);
     if (needs_history(model, settled, other, options.search.rival_margin)) {
       data = again;
       settled = other;

@@ -3,6 +3,7 @@
 
 #include "discovery/terms/input_noise.hpp"
 #include "discovery/terms/missing_findings.hpp"
+#include "discovery/terms/sample_weights.hpp"
 #include "llmt/progress.hpp"
 
 namespace llmt::discovery {
@@ -12,9 +13,8 @@ Eigen::VectorXd scatter(const TermModel& model, const TermData& data, const Term
 
 /// Searches and fits until the found set stays the same: first the terms of rows by themselves, then beside them those
 /// that depend on earlier rows, which stay if they explain better by the rivals' margin. The weights of the outputs in
-/// `data`, and the share of the samples that is independent, follow what each round leaves. `noise`:
-/// of the inputs, or null.
+/// `data`, those of the samples, and the share of the samples that is independent, follow what each round leaves.
 Settled search_terms(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
-                     const TermFit& baseline, const InputNoise* noise, const MissingOptions& options, Work& work);
+                     const TermFit& baseline, const KnownErrors& errors, const MissingOptions& options, Work& work);
 
 }  // namespace llmt::discovery

@@ -31,13 +31,14 @@ class Trials {
     const Eigen::Index n = data.measured.rows();
     const auto own = Eigen::seqN(placed_.output, n, d);
     const ModelTerm& term = model.terms()[placed_.term];
+    weights_ = weights_of(data, placed_.output);
     const Eigen::MatrixXd nuisance = ground.nuisance(own, Eigen::all);
     const Eigen::Index powers = 1 + term.constants.front().beyond;
     Eigen::MatrixXd all(n, nuisance.cols() + powers);
     all.leftCols(nuisance.cols()) = nuisance;
-    for (Eigen::Index p = 0; p < powers; ++p) all.col(nuisance.cols() + p) = power(term, p);
-    constexpr double rank_tolerance = 1e-9;
-    basis_ = range_basis(all, rank_tolerance);
+    for (Eigen::Index p = 0; p < powers; ++p) all.col(nuisance.cols() + p) = weights_.cwiseProduct(power(term, p));
+    constexpr double rounding = 1e-9;
+    basis_ = range_basis(all, rounding);
     residuals_ = ground.residuals(own);
     residuals_ -= basis_ * (basis_.transpose() * residuals_);
   }
@@ -64,12 +65,15 @@ class Trials {
       for (const Eigen::VectorXd& values : tried) gains.push_back(gain(values));
       return gains;
     }
-    const auto columns_of = [&](const std::vector<Eigen::Index>& rows) {
+    const bool is_state = ColumnCache::is_state_of_inputs(model_->terms()[placed_.term]);
+    const auto columns_of = [&](const Samples& samples) {
       const Eigen::Index width = placed_.coefficients.size();
-      Eigen::MatrixXd all(std::ssize(rows), width * std::ssize(tried));
+      Eigen::MatrixXd all(samples.size(), width * std::ssize(tried));
       for (std::size_t k = 0; k < tried.size(); ++k) {
         placed_.constants = tried[k];
-        all.middleCols(static_cast<Eigen::Index>(k) * width, width) = model_->columns_at(placed_, *simulated_, rows);
+        all.middleCols(static_cast<Eigen::Index>(k) * width, width) =
+            is_state ? means(model_->columns(placed_, *simulated_), samples)
+                     : model_->columns_at(placed_, *simulated_, samples.rows());
       }
       return all;
     };
@@ -83,6 +87,7 @@ class Trials {
 
   double gain_of(Eigen::MatrixXd columns) const {
     if (!columns.allFinite()) return 0.0;
+    columns = weights_.asDiagonal() * columns;
     for (Eigen::Index k = 0; k < columns.cols(); ++k) {
       if (carriers(columns.col(k)) < fewest_carriers_) return 0.0;
     }
@@ -117,6 +122,7 @@ class Trials {
   const Eigen::MatrixXd* simulated_;
   double fewest_carriers_;
   bool is_coarse_ = false;
+  Eigen::VectorXd weights_;
   Eigen::MatrixXd basis_;
   Eigen::VectorXd residuals_;
 
@@ -260,7 +266,8 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
     if (std::ranges::any_of(places, [&](double place) { return near(value, place); })) continue;
     places.push_back(value);
     Eigen::VectorXd constants = tried[k];
-    if (constant.smooth) {
+    // A state of the inputs takes all rows to compute, and its constants are fitted with everything else.
+    if (constant.smooth && !ColumnCache::is_state_of_inputs(own)) {
       constants = refined(trials, own.constants, constants, gains[k]);
     } else if (!own.regime.empty() && own.constants.size() == 1 && constant.tried.size() > 1) {
       constants(0) = refined_threshold(trials, constant.tried, constants(0), gains[k]);
