@@ -110,7 +110,7 @@ def heat(run, strength, constants):
         T = run.signals["T"]
         return strength * (T - lagged(T, tau, step, T[0]))
     power, lever = power_and_lever(run)
-    return strength * lagged(power / np.mean(power), tau, step, 0.0) * lever
+    return strength * lagged(power / constants["power"], tau, step, 0.0) * lever
 
 
 def filling(run, strength, constants):
@@ -151,7 +151,10 @@ def constants_of(rng, name, run):
     if name in ("heat", "filling"):
         tau = seconds * 10 ** rng.uniform(-1.3, -0.2)
         x = run.signals[run.machine.coordinates[run.machine.target_axis]]
-        return {"tau": tau, "loading": float(np.quantile(x, rng.uniform(0.3, 0.7)))}
+        constants = {"tau": tau, "loading": float(np.quantile(x, rng.uniform(0.3, 0.7)))}
+        if name == "heat" and run.machine.family != "thermal":
+            constants["power"] = float(np.mean(power_and_lever(run)[0]))  # of the first run, in every run
+        return constants
     if name == "swing":
         return {"frequency": run.fastest * rng.uniform(0.15, 0.8), "zeta": 10 ** rng.uniform(-2.0, -1.0)}
     return {}
