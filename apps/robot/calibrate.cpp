@@ -125,6 +125,10 @@ void add_calibrate(CLI::App& app) {
   add_count(*command, "--min-leaf", options.correction.min_leaf_samples, Eigen::Index{0},
             "Fewest poses in a leaf, 0: twice the coefficients of a leaf")
       ->capture_default_str();
+  command
+      ->add_option("--accept-suspicion", task.accept_suspicion,
+                   "Take the files as they stand although they look like this mistake, by the name that was printed")
+      ->type_name("NAME");
   add_seed(*command, options.seed, "Of the random folds");
   add_threads(*command, options.max_threads);
   add_output_file(*command, "-o,--output", arguments->output,

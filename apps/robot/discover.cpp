@@ -104,6 +104,10 @@ void add_discover(CLI::App& app) {
       ->capture_default_str();
   add_output_file(*command, "-o,--output", arguments->output, "Improved robot description to write (YAML)",
                   {correction_extension});
+  command
+      ->add_option("--accept-suspicion", arguments->task.accept_suspicion,
+                   "Take the files as they stand although they look like this mistake, by the name that was printed")
+      ->type_name("NAME");
   add_seed(*command, arguments->task.options.seed, "Of the poses set aside");
   add_report_options(*command, arguments->reports, "the error before and after");
   command->add_flag("--json", arguments->json, "Print one JSON object");

@@ -1,6 +1,7 @@
 // What the program llmt-robot says of files that are not as they should be.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <filesystem>
 
 #include <algorithm>
 #include <vector>
@@ -96,6 +97,21 @@ TEST(RobotWords, UnitsThatWouldFitAreNamed) {
     expect(sample(1.0, "rad", 1.0, "m"), "most likely the measured positions are millimetres, not metres");
     EXPECT_EQ(said(command, sample(1.0, "rad", 0.001, "m")).find("WARNING"), std::string::npos) << command;
   }
+}
+
+// A file that would wreck a machine is not written, unless its user knows better.
+TEST(RobotWords, NothingIsWrittenForASuspicion) {
+  const Folder folder;
+  folder.write("d.csv", sample(1.0, "deg", 1.0, "mm"));
+  const std::string command = fmt::format("{} calibrate {} d.csv -o c.yaml", robot_program, sample_arm);
+  const Outcome refused = folder.run(command);
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("--accept-suspicion angles_radians takes them as they stand"), std::string::npos)
+      << refused.err;
+  EXPECT_FALSE(std::filesystem::exists(folder.file("c.yaml")));
+  const Outcome other = folder.run(command + " --accept-suspicion joint1_sign");
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_FALSE(std::filesystem::exists(folder.file("c.yaml")));
 }
 
 // The points of another arm: discover() would take the difference for effects.

@@ -64,7 +64,8 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
                    bool correct, int folds, bool contiguous, bool new_session, bool robust,
                    const std::vector<std::string>& fixed, const std::vector<std::string>& only,
                    const std::map<std::string, double>& priors, int max_leaves, Eigen::Index min_leaf,
-                   std::uint64_t seed, int threads, bool quality, bool page, const nb::object& report) {
+                   const std::string& accept_suspicion, std::uint64_t seed, int threads, bool quality, bool page,
+                   const nb::object& report) {
   require_page(page);
   report::CalibrationTask task{.robot_file = arm.name,
                                .data_file = measured.first,
@@ -72,7 +73,8 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
                                .robust = robust,
                                .quality = quality,
                                .page = page,
-                               .new_session = new_session};
+                               .new_session = new_session,
+                               .accept_suspicion = accept_suspicion};
   task.options.correct = correct;
   task.options.folds = folds;
   task.options.kind = contiguous ? FoldKind::contiguous : FoldKind::random;
@@ -118,26 +120,19 @@ std::vector<robotics::EffectType> catalogue_of(const std::optional<Source>& sour
                         : robotics::read_catalogue(source->first);
 }
 
-// Of each measured point whether it was set aside; all were where they are those of a test.
-std::vector<bool> are_set_aside(const report::DiscoveryRun& run) {
-  if (run.has_test) return {};
-  std::vector<bool> rows(run.measurements.count());
-  for (const Eigen::Index row : run.found.held_out.rows) rows[row] = true;
-  std::vector<bool> points;
-  for (const Eigen::Index row : robotics::position_rows(run.measurements.poses)) points.push_back(rows[row]);
-  return points;
-}
-
 nb::dict discover(const Arm& arm, const Source& measured, const std::optional<Source>& test, const Reading& reading,
                   double held_out, int folds, bool contiguous, const std::optional<Source>& catalogue,
-                  double mass_uncertainty, std::uint64_t seed, bool page, const nb::object& report) {
+                  double mass_uncertainty, const std::string& accept_suspicion, std::uint64_t seed, bool page,
+                  const nb::object& report) {
   require_page(page);
+  Outcome outcome(python_face(measured.second));
   report::DiscoveryTask task{.robot_file = arm.name, .folds = folds, .contiguous = contiguous};
+  task.accept_suspicion = accept_suspicion;
+  task.face = outcome.face();
   task.options.catalogue = catalogue_of(catalogue);
   task.options.held_out_share = held_out;
   task.options.mass_uncertainty = mass_uncertainty;
   task.options.seed = seed;
-  Outcome outcome(python_face(measured.second));
   std::optional<report::DiscoveryRun> run;
   std::optional<robotics::Measurements> judged;  // by the picture of the errors
   const auto work = [&](const Progress& progress) {
@@ -160,7 +155,7 @@ nb::dict discover(const Arm& arm, const Source& measured, const std::optional<So
   errors["before"] = numbers_of(robotics::distances(robotics::positions(run->found.before, judged->poses), *judged));
   errors["after"] = numbers_of(robotics::distances(robotics::positions(run->found.improved, judged->poses), *judged));
   result["errors"] = errors;
-  result["set_aside"] = are_set_aside(*run);
+  result["set_aside"] = report::are_set_aside(*run);
   result["page"] = page_of(page, [&] {
     return report::discovery_report(
         {arm.name, measured.first, report::points_of(run->measurements), run->found, run->next});
@@ -324,11 +319,11 @@ void add_robot_tasks(nb::module_& module) {
   using nb::arg;
   module.def("calibrate", &calibrate, arg("robot"), arg("measured"), arg("test").none(), arg("reading"), nb::kw_only(),
              arg("correct"), arg("folds"), arg("contiguous"), arg("new_session"), arg("robust"), arg("fixed"),
-             arg("only"), arg("priors"), arg("max_leaves"), arg("min_leaf"), arg("seed"), arg("threads"),
-             arg("quality"), arg("page"), arg("report").none());
+             arg("only"), arg("priors"), arg("max_leaves"), arg("min_leaf"), arg("accept_suspicion"), arg("seed"),
+             arg("threads"), arg("quality"), arg("page"), arg("report").none());
   module.def("discover", &discover, arg("robot"), arg("measured"), arg("test").none(), arg("reading"), nb::kw_only(),
              arg("held_out"), arg("folds"), arg("contiguous"), arg("catalogue").none(), arg("mass_uncertainty"),
-             arg("seed"), arg("page"), arg("report").none());
+             arg("accept_suspicion"), arg("seed"), arg("page"), arg("report").none());
   module.def("check", &check, arg("robot"), arg("measured"), arg("reading"), nb::kw_only(), arg("same_session"),
              arg("accuracy_mm").none(), arg("level"), arg("report").none());
   module.def("poses", &poses, arg("robot"), arg("reading"), nb::kw_only(), arg("count"), arg("candidates").none(),

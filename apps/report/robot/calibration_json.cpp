@@ -97,6 +97,7 @@ Json calibration_json(const CalibrationRun& run, const std::string& output) {
   std::vector<Finding> warnings = measurements.warnings;
   warnings.insert(warnings.end(), run.input_mistakes.begin(), run.input_mistakes.end());
   json["warnings"] = words(warnings, run.task.face);
+  if (run.suspicion) json["suspicion"] = run.suspicion->name;
   json["outlier_lines"] = run.outlier_lines;
   if (run.used) {
     json["test_coverage"] = {{"outside", run.used->outside.size()},

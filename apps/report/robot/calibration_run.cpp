@@ -52,7 +52,15 @@ void require_poses_for_folds(const CalibrationRun& run) {
   }
 }
 
+bool is_accepted(const CalibrationRun& run) {
+  return !run.suspicion || run.suspicion->name == run.task.accept_suspicion;
+}
+
 std::string refusal_of(const CalibrationRun& run) {
+  if (!is_accepted(run)) {
+    return fmt::format("{}: nothing is written while the files look wrong; {} {} takes them as they stand",
+                       run.task.data_file, run.task.face.option("accept-suspicion"), run.suspicion->name);
+  }
   if (run.is_implausible) {
     return fmt::format(
         "{}: the calibrated robot misses half of the points by more than a fiftieth of its length, or turns its tool "
@@ -79,6 +87,7 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
                      .used = {},
                      .details = {},
                      .learning = {},
+                     .suspicion = {},
                      .is_implausible = false,
                      .refusal = {}};
   robotics::Measurements& measurements = run.measurements;
@@ -100,6 +109,11 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
   }
   run.models = judged_models(run.report, measurements, run.test, run.task.new_session);
   run.input_mistakes = robotics::input_mistakes(run.nominal, measurements, run.report);
+  run.suspicion = robotics::likely_mistake(run.nominal, measurements);
+  if (run.suspicion) {
+    run.input_mistakes.push_back(finding("likely_mistake", run.suspicion->sentence));
+    run.input_mistakes.back().is_mistake = true;
+  }
   if (run.test) {
     robotics::Poses used = run.test->poses;
     used.observations.clear();
@@ -109,7 +123,7 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
   if (run.task.quality) {
     run.details = calibration_details(run.nominal, measurements, run.report, run.task.options);
   }
-  run.is_implausible = robotics::is_implausible(run.nominal, run.report);
+  run.is_implausible = robotics::is_implausible(run.nominal, run.report) || !is_accepted(run);
   if (run.task.quality || (run.task.page && !run.is_implausible)) {
     const robotics::ReportOptions& options = run.task.options;
     run.learning = robotics::learning_curve(run.nominal, measurements, options.calibration, 3, options.seed);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "llmt/robotics/calibration_report.hpp"
+#include "llmt/robotics/likely_mistake.hpp"
 #include "report/robot/calibration_facts.hpp"
 
 namespace llmt::report {
@@ -17,10 +18,11 @@ struct CalibrationTask {
   std::string robot_file;
   std::string data_file;
   std::string test_file;
-  bool robust = false;       ///< leave out readings that lie far off
-  bool quality = false;      ///< with CalibrationDetails and the learning curve
-  bool page = false;         ///< with the learning curve
-  bool new_session = false;  ///< base and tool are fitted to the test measurements
+  bool robust = false;                ///< leave out readings that lie far off
+  bool quality = false;               ///< with CalibrationDetails and the learning curve
+  bool page = false;                  ///< with the learning curve
+  bool new_session = false;           ///< base and tool are fitted to the test measurements
+  std::string accept_suspicion = {};  ///< name of a suspicion that is none
   robotics::ReportOptions options = {};
   Face face = {};
 };
@@ -38,6 +40,7 @@ struct CalibrationRun {
   std::optional<robotics::Coverage> used;  ///< of the poses of the test file
   std::optional<CalibrationDetails> details;
   std::vector<robotics::LearningPoint> learning;  ///< empty if nobody asked for it, or of few poses
+  std::optional<robotics::Suspicion> suspicion;   ///< of a mistake in the files
   bool is_implausible = false;                    ///< the calibrated robot must not be used
   std::string refusal;                            ///< why the result is none, in a sentence; empty if it is one
 };

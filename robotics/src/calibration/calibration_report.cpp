@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "calibration/input_mistakes.hpp"
+#include "calibration/suspected_changes.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
@@ -206,10 +207,6 @@ std::vector<Finding> input_mistakes(const Robot& robot, const Measurements& meas
                               report.geometric.in_sample_mrad.mean(),
                               likely.empty() ? ": is the quaternion w, x, y, z, is the convention of angles right?"
                                              : "; most likely " + likely));
-  }
-  if (nominal > implausible_mm) {
-    const std::string likely = input_mistake(robot, measurements, implausible_share);
-    if (!likely.empty()) add("likely_mistake", likely);
   }
   return found;
 }

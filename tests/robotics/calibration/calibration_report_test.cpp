@@ -1,4 +1,5 @@
 #include "llmt/robotics/calibration_report.hpp"
+#include "llmt/robotics/likely_mistake.hpp"
 
 #include <gtest/gtest.h>
 
@@ -128,10 +129,10 @@ TEST(CalibrationReport, ACalibrationWithoutGainOnUnseenPosesIsSaid) {
             "measure more poses");
 }
 
-// The last of the mistakes named; empty: none.
+// The mistake that would explain what was seen; empty: none.
 std::string last_mistake(const Robot& described, const Measurements& seen) {
-  const std::vector<Finding> found = input_mistakes(described, seen, report_calibration(described, seen, {.folds = 0}));
-  return found.empty() ? std::string() : found.back().words({});
+  const std::optional<Suspicion> found = likely_mistake(described, seen);
+  return found ? found->sentence : std::string();
 }
 
 TEST(CalibrationReport, UnitsThatWouldFitAreNamed) {

@@ -118,6 +118,7 @@ def calibrate(
     prior: Mapping[str, float] | None = None,
     max_leaves: int = 0,
     min_leaf: int = 0,
+    accept_suspicion: str = "",
     seed: int = 1,
     threads: int = 0,
     quality: bool = False,
@@ -147,6 +148,8 @@ def calibrate(
         Standard deviations of what is known beforehand, mm or deg: ``{"joint2.a": 0.1}``.
     max_leaves, min_leaf
         Of a tree of the correction: most leaves, fewest poses in a leaf; 0: no limit, twice the coefficients.
+    accept_suspicion
+        Take the tables as they stand although they look like this mistake, by the name in the error: ``joint5_sign``.
     threads
         0: all. The result does not depend on it.
     quality
@@ -157,9 +160,9 @@ def calibrate(
     Raises
     ------
     ValueError
-        Also where the calibrated robot misses half of the points by more than a fiftieth of its length. Then one
-        mistake after another is tried, such as degrees for radians or a joint that counts the other way, and the one
-        that would explain it is named.
+        Also where the calibrated robot misses half of the points by more than a fiftieth of its length; and where a
+        mistake in the tables would explain them ten times better than the described robot does, such as degrees for
+        radians or a joint that counts the other way: it is named, with the error that remains.
     """
     if new_session and test is None:
         raise ValueError("new_session is about test, which is not given")
@@ -181,6 +184,7 @@ def calibrate(
         priors=priors,
         max_leaves=number("max_leaves", max_leaves, 0, 2**31 - 1, whole=True),
         min_leaf=number("min_leaf", min_leaf, 0, _MOST, whole=True),
+        accept_suspicion=str(accept_suspicion),
         seed=number("seed", seed, 0, 2**64 - 1, whole=True),
         threads=number("threads", threads, 0, 2**31 - 1, whole=True),
         quality=bool(quality),
@@ -205,6 +209,7 @@ def discover(
     decimal_comma: bool = False,
     catalogue: Any = None,
     mass_uncertainty: float = 0.05,
+    accept_suspicion: str = "",
     seed: int = 1,
     report: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
@@ -225,14 +230,16 @@ def discover(
         Effects to look for and their plausible sizes: a YAML file, or a dict with its keys.
     mass_uncertainty
         Relative standard deviation of the described masses.
+    accept_suspicion
+        As in :func:`calibrate`.
     report
         HTML file to write.
 
     Raises
     ------
     ValueError
-        Also where the calibrated robot misses the points by so much that no effect explains it. Then one mistake after
-        another is tried, as by :func:`calibrate`, and the one that would explain it is named.
+        Also where the calibrated robot misses the points by so much that no effect explains it, and where a mistake in
+        the tables explains them, as in :func:`calibrate`.
     """
     arm = _robot_of(robot)
     effects: Source | None = None
@@ -250,6 +257,7 @@ def discover(
         contiguous=bool(contiguous),
         catalogue=effects,
         mass_uncertainty=number("mass_uncertainty", mass_uncertainty, 0.0, 1.0),
+        accept_suspicion=str(accept_suspicion),
         seed=number("seed", seed, 0, 2**64 - 1, whole=True),
         page=report is not None,
         report=progress,

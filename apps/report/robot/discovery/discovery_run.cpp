@@ -10,6 +10,7 @@
 #include "llmt/folds.hpp"
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/catalogue.hpp"
+#include "llmt/robotics/likely_mistake.hpp"
 #include "report/robot/discovery/discovery_page.hpp"
 #include "report/robot/measurement_text.hpp"
 
@@ -91,12 +92,30 @@ DiscoveryRun run_discovery(const robotics::Robot& described, const robotics::Mea
   check_positions(task.robot_file, run.robot, measured.poses);
   if (test) check_positions(task.robot_file, run.robot, test->poses);
   std::ranges::for_each(measured.warnings, warn);
+  const std::optional<robotics::Suspicion> suspicion = robotics::likely_mistake(run.robot, measured);
+  if (suspicion && suspicion->name != task.accept_suspicion) {
+    Finding mistake = finding("likely_mistake", suspicion->sentence);
+    mistake.is_mistake = true;
+    warn(mistake);
+    throw std::runtime_error(
+        fmt::format("nothing is searched while the files look wrong; {} {} takes them as they stand",
+                    task.face.option("accept-suspicion"), suspicion->name));
+  }
   run.found = discovered(run.robot, measured, test, task.options, warn);
   const Progress progress = std::exchange(task.options.progress, {});
   warn_of_misfit(run.robot, measured, warn);  // what cannot be calibrated was refused
   if (task.folds > 0) run.folds = cross_validated(run.robot, measured, task, progress);
   run.next = next_poses(run.found, measured);
   return run;
+}
+
+std::vector<bool> are_set_aside(const DiscoveryRun& run) {
+  if (run.has_test) return {};
+  std::vector<bool> rows(run.measurements.count());
+  for (const Eigen::Index row : run.found.held_out.rows) rows[row] = true;
+  std::vector<bool> points;
+  for (const Eigen::Index row : robotics::position_rows(run.measurements.poses)) points.push_back(rows[row]);
+  return points;
 }
 
 std::string discovery_text(const DiscoveryRun& run, const std::string& data, std::size_t width, const Face& face) {

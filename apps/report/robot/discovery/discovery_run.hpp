@@ -21,6 +21,8 @@ struct DiscoveryTask {
   int folds = 0;  ///< of a cross-validation of the whole discovery; 0: none
   bool contiguous = false;
   robotics::DiscoveryOptions options = {};
+  std::string accept_suspicion = {};  ///< name of a suspicion that is none
+  Face face = {};
 };
 
 /// The whole discovery repeated without each fold and judged on it: mean errors, mm.
@@ -51,6 +53,9 @@ std::vector<std::string> searched_columns(const std::vector<robotics::EffectType
 DiscoveryRun run_discovery(const robotics::Robot& described, const robotics::Measurements& measured,
                            const std::function<robotics::Measurements(const robotics::Robot&)>& read_test,
                            DiscoveryTask task, const Warn& warn);
+
+/// Of each measured point whether it was set aside; empty where the points judged are those of a test.
+std::vector<bool> are_set_aside(const DiscoveryRun& run);
 
 /// For people. `data`: the name of the table of measurements.
 std::string discovery_text(const DiscoveryRun& run, const std::string& data, std::size_t width = no_width_limit,

@@ -75,8 +75,8 @@ struct CalibrationReport {
 
 /// Likely mistakes in description or measurements, which are no errors of the robot: poses beyond the
 /// joint limits of the description; a mean error of more than a fiftieth of the arm's length, as wrong units, signs,
-/// zeros or another robot give, before calibration or even after it, with the units that would fit; too few poses for
-/// the parameters; no gain on poses left out. Empty: nothing looks wrong.
+/// zeros or another robot give, before calibration or even after it; too few poses for the parameters; no gain on poses
+/// left out. Empty: nothing looks wrong.
 std::vector<Finding> input_mistakes(const Robot& robot, const Measurements& measurements,
                                     const CalibrationReport& report);
 

@@ -23,6 +23,7 @@
 #include "llmt/robotics/effect_type.hpp"
 #include "llmt/robotics/effects.hpp"
 #include "llmt/robotics/kinematics.hpp"
+#include "llmt/robotics/likely_mistake.hpp"
 #include "llmt/robotics/measurements.hpp"
 #include "llmt/robotics/mechanism/mechanism.hpp"
 #include "llmt/robotics/mechanism/mechanism_calibration.hpp"
