@@ -11,6 +11,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -54,6 +55,13 @@ double misfit_of(Robot robot, const Measurements& table) {
   } catch (const std::exception&) {
     return std::numeric_limits<double>::infinity();  // so it is not that
   }
+}
+
+Eigen::Index distinct_poses(const Poses& poses) {
+  std::set<std::vector<double>> distinct;
+  for (Eigen::Index i = 0; i < poses.count(); ++i)
+    distinct.insert({poses.joints.row(i).begin(), poses.joints.row(i).end()});
+  return std::ssize(distinct);
 }
 
 // The mean distance where base and tool are fitted in turn, each exactly: an upper bound of misfit_of() that takes next
@@ -239,6 +247,10 @@ std::optional<Suspicion> likely_mistake(const Robot& robot, const Measurements& 
   const Candidate given{robot, some_of(measurements), {}};
   const double misfit_mm = misfit_of(robot, given.table);
   const double share = misfit_mm / spread_of(given.table.positions_mm);
+  // Fewer poses than base and tool take fit with any mistake, and rounding is none.
+  constexpr Eigen::Index fewest_poses = 10;
+  constexpr double rounding = 1e-6;  // of the arm's length
+  if (distinct_poses(measurements.poses) < fewest_poses || !(misfit_mm > rounding * length_of(robot.chain))) return {};
   const auto explains = [&](const Explanation& own, const Chain& chain) {
     return own.share < std::min(far_better * share, of_spread) && own.misfit_mm < plausible_share * length_of(chain);
   };

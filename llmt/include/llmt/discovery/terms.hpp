@@ -65,6 +65,11 @@ std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string&
 ///   this share of the simulated output moves a load behind a spring and damper, which rings. Frequency and damping
 ///   ratio zeta are searched, zeta below 0.16: what is damped more is rather a filter. Exact for a signal that is a
 ///   straight line between rows.
+///   resonance x   (H - 1) x of a speed or an acceleration x: a load that swings, from a tenth of the frequency of the
+///   motion to twice as much.
+///   lag           z - s, tau dz/dt = s - z; for a negative tau -tau ds/dt, the command of a slow actuator.
+///   memory x, warming x, warmth x: x - lag x, x lag x^2, lag x^2 of every input x, where tau d(lag)/dt = x - lag
+///   (x^2 - lag); lag x begins at x, lag x^2 at 0, with every run. Time constants tau up to the length of a run.
 /// Derivatives by time are those of local polynomials; ds/dq and ds/da are those of a function that is fitted to the
 /// table. `simulated` n x d. Empty for less than 60 rows. Throws as standard_terms().
 std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::MatrixXd& simulated,

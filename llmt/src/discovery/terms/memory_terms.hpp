@@ -9,8 +9,9 @@
 
 namespace llmt::discovery {
 
-/// At the rows in time, the first-order lag of a signal x (n): tau dz/dt = x - z from z = `start` at the beginning of
-/// every run, exact for a signal that is a straight line between rows; rows left out are bridged by such lines.
+/// At the rows in time, the first-order lag of a signal x (n): tau dz/dt = x - z; with every run z begins at x, or at 0
+/// where it does not start settled; exact for a signal that is a straight line between rows; rows left out are bridged
+/// by such lines.
 Eigen::VectorXd lagged(const Rows& rows, const Eigen::VectorXd& signal, double tau, bool starts_settled);
 
 /// For an output of rows in time, n x d `simulated`: its lag or lead by a time of its own; and of every input x what a
