@@ -22,11 +22,12 @@ bool is_raised(const Missing& missing, Reason reason) {
 // What the terms that were found are.
 enum class Certainty { any, none, tentative, rivalled, certain };
 
-// A state whose size is beyond chance.
+// A state whose size is beyond chance. A spring gives way: its compliance is positive.
 bool is_certain_state(const FoundTerm& found) {
   constexpr double certain = 2.0;  // standard errors
-  return !found.inner_state.empty() &&
-         std::abs(found.values.front().value) > certain * found.values.front().standard_error;
+  if (found.inner_state.empty()) return false;
+  const TermValue& first = found.values.front();
+  return (found.family == "drive_spring" ? first.value : std::abs(first.value)) > certain * first.standard_error;
 }
 
 struct Ruling {

@@ -213,6 +213,17 @@ std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::ve
   return narrow;
 }
 
+std::set<std::size_t> states_by_chance(const Missing& missing) {
+  std::set<std::size_t> chance;
+  for (const Objection& objection : missing.objections) {
+    if (objection.reason != Reason::vague_state && objection.reason != Reason::errors_of_inputs) continue;
+    for (const std::size_t k : objection.terms) {
+      if (!missing.found[k].inner_state.empty()) chance.insert(missing.found[k].term);
+    }
+  }
+  return chance;
+}
+
 bool is_drift(const Missing& missing) {
   constexpr double fewest = 10.0;
   constexpr double slow = 0.5;  // independent share; rows may also be few

@@ -48,6 +48,10 @@ std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector
 std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::vector<ModelTerm>& terms,
                                            const Inputs& inputs, const Eigen::VectorXd& of_smoothed);
 
+/// States found whose size may be 0, or that errors of the inputs could make. They filter the simulated output, and so
+/// take errors of the inputs out of it.
+std::set<std::size_t> states_by_chance(const Missing& missing);
+
 /// Of the errors of an output on the samples set aside: at the nominal parameters, with parameters alone, with terms.
 Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,
            const Eigen::VectorXd& after, double noise_floor);

@@ -109,6 +109,9 @@ Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const Measur
   constexpr double described = 0.9;
   if (surrogate.described().minCoeff() >= described) {
     deviations += as_measured(inputs, surrogate.jumps(inputs.values));
+  } else {
+    deviations.conservativeResize(Eigen::NoChange, 2 * measured.values.cols());
+    deviations.rightCols(measured.values.cols()) = measured.values;
   }
   inputs.zero_bands = zero_bands(inputs, deviations);
   if (!(inputs.zero_bands.array() > 0.0).any()) inputs.zero_bands.resize(0);
@@ -130,12 +133,14 @@ Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, cons
     if (trial > 1) missing = search_once(simulation, inputs, measured, terms, rows, options, refuted);
     const std::set<std::size_t> beyond = beyond_constants(missing, terms);
     const std::set<std::size_t> narrow = narrower_than_errors(missing, terms, inputs, smooth.errors);
+    const std::set<std::size_t> chance = states_by_chance(missing);
     const auto is_unproven = [&](const FoundTerm& found) { return in_time && !found.shrinks_gap; };
     const bool holds =
         missing.answer != Answer::failed_held_out && std::ranges::none_of(missing.found, [&](const FoundTerm& found) {
-          return is_unproven(found) || beyond.contains(found.term) || narrow.contains(found.term);
+          return is_unproven(found) || beyond.contains(found.term) || narrow.contains(found.term) ||
+                 chance.contains(found.term);
         });
-    if (holds || (trial >= most && beyond.empty() && narrow.empty())) {
+    if (holds || (trial >= most && beyond.empty() && narrow.empty() && chance.empty())) {
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
       return missing;
     }
@@ -143,13 +148,15 @@ Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, cons
     for (const FoundTerm& found : missing.found) {
       const bool fails_again = is_unproven(found) && !unproven.insert(found.term).second;
       const bool is_narrow = narrow.contains(found.term);
-      if (!found.is_refuted && !fails_again && !is_narrow) continue;
+      const bool is_chance = chance.contains(found.term);
+      if (!found.is_refuted && !fails_again && !is_narrow && !is_chance) continue;
       refuted.insert(found.term);
       const std::string place = found.location.empty() ? "" : " " + found.location;
       const std::string name = found.generic ? "an error pattern of" + place : found.family + place;
       notes.push_back(name + " was found and taken back: " +
                       (is_narrow ? fmt::format("it is narrower than the errors of {}, or than its steps between rows",
                                                found.location)
+                       : is_chance        ? "errors of the inputs can make such a state"
                        : found.is_refuted ? "it makes the error on rows set aside larger"
                                           : "it does not make the error on rows set aside smaller"));
     }

@@ -3,11 +3,16 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "discovery/signals/kernel.hpp"
 #include "discovery/terms/derivatives.hpp"
+#include "discovery/terms/motion.hpp"
 #include "discovery/terms/row_split.hpp"
+#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -79,48 +84,88 @@ double band_of(const Eigen::VectorXd& x) {
   return 0.0;
 }
 
-// Whether values jump where x passes the band: least squares of those at the next rows on both sides on 1, x and sgn x.
-bool jumps(const Eigen::VectorXd& x, const Eigen::VectorXd& values, double band) {
+// How surely values jump where x passes the band, in standard errors: least squares of those at the next rows on both
+// sides on 1, x, sgn x and the signs of other inputs. One row of `stride` is independent of the others.
+double jump_of(const Eigen::VectorXd& x, const Eigen::VectorXd& values, double band, const std::vector<bool>& apart,
+               const Eigen::MatrixXd& signs, double stride) {
   constexpr double share_of_rows = 0.1;  // on each side
   const auto next = static_cast<std::size_t>(share_of_rows * static_cast<double>(x.size()));
   constexpr std::size_t fewest = 10;
-  constexpr double surprising = 4.0;
   std::vector<Eigen::Index> rows;
   for (const double side : {-1.0, 1.0}) {
     std::vector<std::pair<double, Eigen::Index>> beyond;
     for (Eigen::Index i = 0; i < x.size(); ++i) {
-      if (side * x(i) >= band) beyond.emplace_back(side * x(i), i);
+      if (side * x(i) >= band && !apart[i]) beyond.emplace_back(side * x(i), i);
     }
-    if (beyond.size() < fewest) return false;
+    if (beyond.size() < fewest) return 0.0;
     std::ranges::sort(beyond);
     beyond.resize(std::min(beyond.size(), next));
     for (const auto& [size, row] : beyond) rows.push_back(row);
   }
-  Eigen::MatrixXd columns(std::ssize(rows), 3);
-  columns << Eigen::VectorXd::Ones(std::ssize(rows)), x(rows), x(rows).cwiseSign();
+  Eigen::MatrixXd columns(std::ssize(rows), 3 + signs.cols());
+  columns << x(rows).cwiseSign(), Eigen::VectorXd::Ones(std::ssize(rows)), x(rows), signs(rows, Eigen::all);
   const Eigen::VectorXd here = values(rows);
-  const Eigen::LDLT<Eigen::MatrixXd> gram(columns.transpose() * columns);
-  const Eigen::VectorXd fit = gram.solve(columns.transpose() * here);
-  const double variance = (here - columns * fit).squaredNorm() / static_cast<double>(here.size() - 3);
-  const double inverse = gram.solve(Eigen::Vector3d::Unit(2))(2);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
+  if (qr.rank() < columns.cols() || here.size() <= columns.cols()) return 0.0;
+  const Eigen::VectorXd fit = qr.solve(here);
+  const double variance =
+      (here - columns * fit).squaredNorm() / static_cast<double>(here.size() - columns.cols());
+  const double inverse = (columns.transpose() * columns).ldlt().solve(Eigen::VectorXd::Unit(columns.cols(), 0))(0);
   constexpr double rounding = 1e-9;
-  return std::abs(fit(2)) > std::max(surprising * std::sqrt(variance * inverse), rounding * here.cwiseAbs().maxCoeff());
+  if (std::abs(fit(0)) <= rounding * here.cwiseAbs().maxCoeff()) return 0.0;
+  return std::abs(fit(0)) / std::max(std::sqrt(stride * variance * inverse), std::numeric_limits<double>::min());
+}
+
+// A machine at rest has no speed. It may be anywhere, and its acceleration is 0 at a steady speed too.
+void keep_speeds(const Inputs& inputs, Eigen::VectorXd& bands) {
+  if (!(bands.array() > 0.0).any()) return;
+  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
+  constexpr Eigen::Index lags = 2;
+  for (const Motion& motion : motions(Derivatives(rows, lags * smooth_lag(rows, inputs.values)), inputs)) {
+    bands(motion.position) = 0.0;
+    bands(motion.acceleration) = 0.0;
+  }
 }
 
 }  // namespace
 
 Eigen::VectorXd zero_bands(const Inputs& inputs, const Eigen::MatrixXd& deviations) {
-  Eigen::VectorXd bands = Eigen::VectorXd::Zero(inputs.values.cols());
-  for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
+  const Eigen::Index p = inputs.values.cols();
+  Eigen::VectorXd dense = Eigen::VectorXd::Zero(p);
+  for (Eigen::Index j = 0; j < p; ++j) {
     const Eigen::VectorXd x = inputs.values.col(j);
-    if (!(x.minCoeff() < 0.0 && x.maxCoeff() > 0.0) || !is_smooth_in_time(inputs, j)) continue;
-    const double band = band_of(x);
-    if (!(band > 0.0)) continue;
-    for (Eigen::Index o = 0; o < deviations.cols(); ++o) {
-      if (jumps(x, deviations.col(o), band)) bands(j) = band;
-    }
+    if (x.minCoeff() < 0.0 && x.maxCoeff() > 0.0 && is_smooth_in_time(inputs, j)) dense(j) = band_of(x);
   }
-  return bands;
+  keep_speeds(inputs, dense);
+  double stride = 1.0;
+  if (inputs.cutoff > 0.0) {
+    const double step = median_step(rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows())));
+    if (step > 0.0) stride = static_cast<double>(independent_step(inputs.cutoff, step));
+  }
+  // Axes that stop together jump together: the surest is taken, and the others are looked at beside it.
+  Inputs rests = inputs;
+  rests.zero_bands = Eigen::VectorXd::Zero(p);
+  Eigen::MatrixXd signs(inputs.values.rows(), 0);
+  for (;;) {
+    constexpr double surprising = 4.0;
+    double surest = surprising;
+    Eigen::Index next = -1;
+    const std::vector<bool> apart = rows_at_rest(rests);
+    for (Eigen::Index j = 0; j < p; ++j) {
+      if (!(dense(j) > 0.0) || rests.zero_bands(j) > 0.0) continue;
+      for (Eigen::Index o = 0; o < deviations.cols(); ++o) {
+        const double jump = jump_of(inputs.values.col(j), deviations.col(o), dense(j), apart, signs, stride);
+        if (jump > surest) {
+          surest = jump;
+          next = j;
+        }
+      }
+    }
+    if (next < 0) return rests.zero_bands;
+    rests.zero_bands(next) = dense(next);
+    signs.conservativeResize(Eigen::NoChange, signs.cols() + 1);
+    signs.rightCols(1) = inputs.values.col(next).cwiseSign();
+  }
 }
 
 std::vector<bool> rows_at_rest(const Inputs& inputs) {

@@ -28,7 +28,9 @@ std::vector<UnknownSign> rows_of_unknown_sign(const Rows& rows, const Inputs& in
 /// band holds at least three times as many rows as an interval of that width where the input passes. Dry friction at
 /// rest is whatever holds, so that rows within the band say nothing of it. They matter where the deviations (n x d)
 /// jump: least squares of the next tenth of the rows on both sides on 1, x and sgn x gives sgn x more than 4 standard
-/// errors. Else the band is 0. Bands of more than half of the rows are not looked at.
+/// errors. Else the band is 0. Bands of more than half of the rows are not looked at. Of a position, its speed and its
+/// acceleration (`motions`) only the speed rests. Where several inputs jump, as axes that stop together, the surest is
+/// taken first; the next is looked at on the rows that are left, with the signs of those taken as columns beside it.
 Eigen::VectorXd zero_bands(const Inputs& inputs, const Eigen::MatrixXd& deviations);
 
 /// Marks the rows at which an input is within its band.

@@ -24,8 +24,22 @@ Surrogate::Surrogate(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simul
     : centre_(inputs.colwise().mean()),
       spread_((inputs.rowwise() - centre_).array().square().colwise().mean().sqrt()),
       low_(inputs.colwise().minCoeff()),
-      high_(inputs.colwise().maxCoeff()) {
+      high_(inputs.colwise().maxCoeff()),
+      with_peaks_(inputs.cols(), false) {
   for (double& spread : spread_) spread = spread > 0.0 ? spread : 1.0;
+  fit(inputs, simulated);
+  constexpr double well = 0.98;
+  constexpr double clearly = 0.8;
+  for (Eigen::Index j = 0; j < inputs.cols() && described_.minCoeff() < well; ++j) {
+    if (!changes_sign(j)) continue;
+    const Surrogate without = *this;
+    with_peaks_[j] = true;
+    fit(inputs, simulated);
+    if (1.0 - described_.minCoeff() > clearly * (1.0 - without.described_.minCoeff())) *this = without;
+  }
+}
+
+void Surrogate::fit(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simulated) {
   const Eigen::Index n = inputs.rows();
   constexpr Eigen::Index parts = 5;
   constexpr Eigen::Index rows_for_a_feature = 4;
@@ -46,13 +60,14 @@ Surrogate::Surrogate(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simul
   }
   coefficients_ = ridge_fit(all, simulated);
   described_ = Eigen::VectorXd::Ones(simulated.cols());
+  undescribed_ = errors.colwise().squaredNorm().transpose() / static_cast<double>(n);
   for (Eigen::Index o = 0; o < simulated.cols(); ++o) {
     const double total = (simulated.col(o).array() - simulated.col(o).mean()).square().sum();
     if (total > 0.0) described_(o) = 1.0 - errors.col(o).squaredNorm() / total;
   }
 }
 
-Eigen::MatrixXd Surrogate::features(const Eigen::MatrixXd& inputs) const {
+Eigen::MatrixXd Surrogate::features(const Eigen::MatrixXd& inputs, std::vector<Dry>* dry) const {
   const Eigen::Index n = inputs.rows();
   const Eigen::Index p = inputs.cols();
   std::vector<Eigen::ArrayXd> columns = {Eigen::ArrayXd::Ones(n)};
@@ -64,7 +79,14 @@ Eigen::MatrixXd Surrogate::features(const Eigen::MatrixXd& inputs) const {
     columns.insert(columns.end(), {own.sin(), own.cos()});
     if (changes_sign(j)) {
       const Eigen::ArrayXd scaled = own / spread_(j);
-      columns.insert(columns.end(), {own.sign(), scaled.abs(), scaled * scaled.abs()});
+      columns.insert(columns.end(), {scaled.abs(), scaled * scaled.abs()});
+      constexpr int widths = 7;
+      const int peaks = with_peaks_[j] ? widths : 0;
+      if (dry) dry->push_back({std::ssize(columns), 1 + peaks});
+      columns.push_back(own.sign());
+      for (int k = 0; k < peaks; ++k) {
+        columns.push_back(own.sign() * (-(scaled * std::ldexp(1.0, k)).square()).exp());
+      }
     }
     for (Eigen::Index k = 0; k < j && with_products_; ++k) {
       const Eigen::ArrayXd other = z.col(k).array();
@@ -80,15 +102,16 @@ Eigen::MatrixXd Surrogate::features(const Eigen::MatrixXd& inputs) const {
 Eigen::MatrixXd Surrogate::predict(const Eigen::MatrixXd& inputs) const { return features(inputs) * coefficients_; }
 
 Eigen::MatrixXd Surrogate::jumps(const Eigen::MatrixXd& inputs) const {
+  std::vector<Dry> dry;
+  const Eigen::MatrixXd all = features(inputs, &dry);
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(inputs.rows(), coefficients_.cols());
-  Eigen::Index place = 1;
-  for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
-    place += 5;
-    if (changes_sign(j)) {
-      sum += inputs.col(j).cwiseSign() * coefficients_.row(place);
-      place += 3;
+  for (const Dry& of_input : dry) {
+    const auto columns = Eigen::seqN(of_input.first, of_input.count);
+    const Eigen::MatrixXd part = all(Eigen::all, columns) * coefficients_(columns, Eigen::all);
+    for (Eigen::Index o = 0; o < part.cols(); ++o) {
+      // What is smaller may stand for something that is not described.
+      if (part.col(o).squaredNorm() > undescribed_(o) * static_cast<double>(inputs.rows())) sum.col(o) += part.col(o);
     }
-    if (with_products_) place += j * (inputs.cols() <= most_with_squares ? 3 : 1);
   }
   return sum;
 }
