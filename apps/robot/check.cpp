@@ -50,6 +50,7 @@ void check_command(const CheckArguments& arguments) {
     print(report::check_text(facts));
   }
   if (const std::string refusal = report::check_refusal(facts); !refusal.empty()) throw std::runtime_error(refusal);
+  if (check.verdict == robotics::CheckVerdict::moved_within_limits) throw ExitCode{exit_changed};
 }
 
 }  // namespace
@@ -59,7 +60,8 @@ void add_check(CLI::App& app) {
                                          "Is a calibrated robot still good? What of it moved?\n"
                                          "Judges a description that calibrate wrote by new measurements, and names the "
                                          "parameters and effects that changed. "
-                                         "The exit code is 1 where the mean error is beyond what was stated.");
+                                         "Exit codes: 0 still good, 1 no longer good, 3 moved but within limits, 4 not "
+                                         "evaluated.");
   command->footer("Example: llmt-robot check calibrated.yaml measured_today.csv --accuracy-mm 0.1");
   const auto arguments = std::make_shared<CheckArguments>();
   add_input_file(*command, "model", arguments->robot, "Calibrated description (YAML)")->required();

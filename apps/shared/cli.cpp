@@ -155,6 +155,10 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
     }
     refuse_unknown_names(app, argc, argv);
     return parse(app, argc, argv);
+  } catch (const ExitCode& end) {
+    return end.code;
+  } catch (const report::NotEvaluated& error) {
+    return fail(error.what(), exit_not_evaluated);
   } catch (const std::invalid_argument& error) {
     const std::string misuse = word_in_place_of_a_file(app, argc, argv);
     return fail(misuse.empty() ? error.what() : misuse, exit_usage);

@@ -9,6 +9,7 @@
 
 #include "llmt/finding.hpp"
 #include "report/text/json.hpp"
+#include "report/text/not_evaluated.hpp"
 #include "report/text/text.hpp"
 #include "shared/progress.hpp"
 
@@ -19,10 +20,18 @@ using report::Json;
 using report::number;
 using report::Table;
 
-/// Exit codes: done; the data or the outcome does not allow it; wrong usage.
+/// Exit codes: done, or good; the data or the outcome does not allow it, or no longer good; wrong usage; changed, but
+/// within limits; not evaluated (report::NotEvaluated).
 inline constexpr int exit_done = 0;
 inline constexpr int exit_refused = 1;
 inline constexpr int exit_usage = 2;
+inline constexpr int exit_changed = 3;
+inline constexpr int exit_not_evaluated = 4;
+
+/// Thrown by a command that has said everything, to end with this exit code.
+struct ExitCode {
+  int code = exit_done;
+};
 
 /// How the library's name of a setting is written on the command line: "folds.count", "--cv".
 struct SettingName {
@@ -36,8 +45,9 @@ std::string in_words_of_user(std::string_view message, std::span<const SettingNa
 
 /// Adds --version, parses the command line, runs the callbacks of the subcommands and turns what they throw into a
 /// message on stderr and an exit code: std::invalid_argument (an option that the library cannot accept) is wrong usage,
-/// every other exception a refusal. `names`: for in_words_of_user(). SIGINT, SIGTERM and SIGHUP end the program without
-/// leaving a temporary file; a file that may not grow further (SIGXFSZ) is a failed write.
+/// report::NotEvaluated has a code of its own, every other exception is a refusal. An ExitCode is that code. `names`:
+/// for in_words_of_user(). SIGINT, SIGTERM and SIGHUP end the program without leaving a temporary file; a file that may
+/// not grow further (SIGXFSZ) is a failed write.
 int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names = {});
 
 /// The text with control characters but tabs and line breaks, marks of direction and bytes that are never UTF-8 written

@@ -42,9 +42,50 @@ TEST(CheckProgram, AnArmThatStayedIsGoodAndOneThatWasKnockedIsNot) {
   EXPECT_NE(bad.out.find("joint3.theta: 0.0"), std::string::npos) << bad.out;
   EXPECT_NE(bad.err.find("the mean error is"), std::string::npos) << bad.err;
   const Outcome json = folder.run(robot_program + " check cal.yaml knocked.csv --accuracy-mm 5 --json");
-  EXPECT_EQ(json.exit_code, 0);
+  EXPECT_EQ(json.exit_code, 3);
+  EXPECT_TRUE(json.err.empty()) << json.err;
   EXPECT_EQ(nlohmann::json::parse(json.out)["moved"][0]["name"], "joint3.theta");
+  EXPECT_EQ(nlohmann::json::parse(json.out)["verdict"], "moved, within limits");
+  const Outcome moved = folder.run(robot_program + " check cal.yaml knocked.csv --accuracy-mm 5");
+  EXPECT_NE(moved.out.find("\nMOVED, WITHIN LIMITS."), std::string::npos) << moved.out;
   EXPECT_EQ(folder.run(robot_program + " check cal.yaml new.csv --same-session").exit_code, 0);
+}
+
+TEST(CheckProgram, ALostBeamIsNamedByLineAndLeftOut) {
+  const Folder folder;
+  calibrate_sample(folder);
+  std::istringstream table(llmt::read_file(folder.file("new.csv")));
+  std::string changed;
+  std::string text;
+  for (int line = 1; std::getline(table, text); ++line) {
+    if (line == 9) {
+      const std::size_t last = text.rfind(',');
+      text = fmt::format("{},{:.6f}", text.substr(0, last), std::stod(text.substr(last + 1)) + 5.0);
+    }
+    changed += text + "\n";
+  }
+  folder.write("lost.csv", changed);
+  const Outcome run = folder.run(robot_program + " check cal.yaml lost.csv");
+  EXPECT_EQ(run.exit_code, 0) << run.out << run.err;
+  EXPECT_NE(run.out.find("\nSTILL GOOD."), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("1 reading lies far from the robot while the others agree, and was left out:\n  line 9: 4.98"),
+            std::string::npos)
+      << run.out;
+  const nlohmann::json json = nlohmann::json::parse(folder.run(robot_program + " check cal.yaml lost.csv --json").out);
+  EXPECT_EQ(json["bad"][0]["line"], 9);
+  EXPECT_EQ(json["poses"], 39);
+}
+
+TEST(CheckProgram, WhatCannotBeJudgedIsNeitherGoodNorBad) {
+  const Folder folder;
+  calibrate_sample(folder);
+  folder.run("head -n 6 new.csv > few.csv");
+  const Outcome few = folder.run(robot_program + " check cal.yaml few.csv");
+  EXPECT_EQ(few.exit_code, 4) << few.err;
+  EXPECT_NE(few.err.find("there are 5 poses, at least 8 are needed"), std::string::npos) << few.err;
+  folder.run("sed 1s/_rad/_deg/g new.csv > wrong.csv");
+  EXPECT_EQ(folder.run(robot_program + " check cal.yaml wrong.csv").exit_code, 4);
+  EXPECT_EQ(folder.run(robot_program + " check " + samples + "arm.yaml new.csv").exit_code, 4);
 }
 
 TEST(CheckProgram, PosesBeyondTheCalibratedRangesAreNamedByLineAndJoint) {
@@ -106,7 +147,7 @@ TEST(CheckProgram, RefusesWhatIsNoCalibration) {
   const Folder folder;
   calibrate_sample(folder);
   const Outcome run = folder.run(fmt::format("{} check {}arm.yaml new.csv", robot_program, samples));
-  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_EQ(run.exit_code, 4);
   EXPECT_NE(run.err.find("arm.yaml, new.csv: "), std::string::npos) << run.err;
   EXPECT_NE(run.err.find("it was not calibrated"), std::string::npos) << run.err;
   const Outcome exchanged = folder.run(robot_program + " check new.csv cal.yaml");

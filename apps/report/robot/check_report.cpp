@@ -41,6 +41,18 @@ std::vector<Eigen::Index> lines_of(const robotics::Measurements& measurements, c
   return lines;
 }
 
+std::string bad_text(const CheckFacts& facts) {
+  std::string text;
+  for (const robotics::BadReading& bad : facts.check.bad) {
+    text += fmt::format("  {}: {:.4g} mm\n", facts.face.rows({facts.measurements.lines[bad.row]}, 1), bad.error_mm);
+  }
+  if (text.empty()) return "";
+  const std::size_t count = facts.check.bad.size();
+  return fmt::format("{} far from the robot while the others agree, and {} left out:\n{}",
+                     count == 1 ? "1 reading lies" : fmt::format("{} readings lie", count), count == 1 ? "was" : "were",
+                     text);
+}
+
 std::string coverage_text(const CheckFacts& facts) {
   constexpr std::size_t most = 20;
   const robotics::Measurements& measurements = facts.measurements;
@@ -54,7 +66,7 @@ std::string coverage_text(const CheckFacts& facts) {
   if (check.uncovered.empty()) return text;
   const std::vector<Eigen::Index> lines = lines_of(measurements, check.uncovered);
   text += fmt::format("{} of {} readings lie beyond the calibrated joint ranges ({}):\n", check.uncovered.size(),
-                      measurements.count(), facts.face.rows(lines, most));
+                      check.judged.size(), facts.face.rows(lines, most));
   for (const robotics::JointBeyond& joint : check.beyond) {
     text += fmt::format("  {} from {:.4g} to {:.4g} {}, calibrated from {:.4g} to {:.4g} ({})\n", joint.joint,
                         joint.used_low, joint.used_high, joint.unit, joint.measured_low, joint.measured_high,
@@ -64,7 +76,7 @@ std::string coverage_text(const CheckFacts& facts) {
     return text + "The others are too few to say what moved.\n";
   }
   text += fmt::format("The other {} decide what moved. {} Their mean error is {:.4f} mm (95 % {:.4f}, max {:.4f}).\n",
-                      measurements.count() - std::ssize(check.uncovered),
+                      check.judged.size() - check.uncovered.size(),
                       check.good_where_covered ? "By them the robot is still good." : "By them it is no longer good.",
                       check.covered_error.mean, check.covered_error.p95, check.covered_error.max);
   return text;
@@ -99,10 +111,12 @@ std::string moved_text(const CheckFacts& facts) {
 
 std::string check_summary(const CheckFacts& facts) {
   const RobotCheck& check = facts.check;
+  const char* const verdict = check.verdict == robotics::CheckVerdict::still_good            ? "STILL GOOD."
+                              : check.verdict == robotics::CheckVerdict::moved_within_limits ? "MOVED, WITHIN LIMITS."
+                                                                                             : "NO LONGER GOOD.";
   return fmt::format("{} Mean position error {:.4f} mm (95 % {:.4f}, max {:.4f}); {} {:.4f} mm, good up to {:.4f} mm.",
-                     check.still_good ? "STILL GOOD." : "NO LONGER GOOD.", check.error.mean, check.error.p95,
-                     check.error.max, facts.options.accuracy_mm ? "stated" : "at calibration", check.accuracy_mm,
-                     check.limit_mm);
+                     verdict, check.error.mean, check.error.p95, check.error.max,
+                     facts.options.accuracy_mm ? "stated" : "at calibration", check.accuracy_mm, check.limit_mm);
 }
 
 std::string check_text(const CheckFacts& facts) {
@@ -117,6 +131,7 @@ std::string check_text(const CheckFacts& facts) {
                                            "these poses ({} keeps them).\n\n",
                                            facts.face.switched("same-session"));
   text += check_summary(facts) + "\n";
+  text += bad_text(facts);
   if (check.accuracy_is_of_noise) {
     text += fmt::format(
         "The description has no error of these coordinates on poses left out: that figure comes from the poses it was "
@@ -179,6 +194,14 @@ Json uncovered_json(const robotics::Measurements& measurements, const RobotCheck
           {"moved_beyond", moved_json(check.moved_beyond)}};
 }
 
+Json bad_json(const CheckFacts& facts) {
+  Json list = Json::array();
+  for (const robotics::BadReading& bad : facts.check.bad) {
+    list.push_back({{"line", facts.measurements.lines[bad.row]}, {"error_mm", bad.error_mm}});
+  }
+  return list;
+}
+
 }  // namespace
 
 Json check_json(const CheckFacts& facts) {
@@ -187,7 +210,9 @@ Json check_json(const CheckFacts& facts) {
                {"data", facts.data},
                {"poses", check.errors_mm.size()},
                {"same_session", facts.options.same_session},
+               {"verdict", robotics::to_string(check.verdict)},
                {"still_good", check.still_good},
+               {"bad", bad_json(facts)},
                {"error_mm", figures_json(check.error)},
                {"accuracy_mm", check.accuracy_mm},
                {"limit_mm", check.limit_mm},

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "report/robot/input_checks.hpp"
+#include "report/text/not_evaluated.hpp"
 
 namespace llmt::report {
 
@@ -40,11 +41,11 @@ robotics::RobotCheck run_check(const std::string& robot_file, const std::string&
     check = robotics::check_robot(robot, measurements, options);
   } catch (const std::invalid_argument& error) {
     // What calibrations refuse of the number of poses or of the description is said with the names of the files.
-    throw std::runtime_error(fmt::format("{}, {}: {}", robot_file, data, error.what()));
+    throw NotEvaluated(fmt::format("{}, {}: {}", robot_file, data, error.what()));
   }
   constexpr double implausible_share = 0.02;
   if (check.error.mean > implausible_share * robotics::reach_of(robot.robot.chain)) {
-    throw std::runtime_error(fmt::format(
+    throw NotEvaluated(fmt::format(
         "{}: the robot misses the points by {:.0f} mm on average, base and tool {}: these are not measurements of it; "
         "check units, signs and order of the columns",
         data, check.error.mean, options.same_session ? "as calibrated" : "fitted to them"));

@@ -13,8 +13,9 @@ namespace llmt::report {
 /// The robot to read measurements of one session for, which it need not know: its frames are fitted anyway.
 robotics::Robot for_any_session(robotics::Robot robot);
 
-/// Judges a robot, which is for_any_session() unless the session is the same. Throws std::runtime_error with the names
-/// of the files where the measurements are not of this robot, or do not suit it.
+/// Judges a robot, which is for_any_session() unless the session is the same. Throws with the names of the files:
+/// NotEvaluated where the measurements are of another robot, or too few, or the description says no accuracy;
+/// std::runtime_error where their frames do not suit it.
 robotics::RobotCheck run_check(const std::string& robot_file, const std::string& data,
                                const robotics::CorrectedRobot& robot, const robotics::Measurements& measurements,
                                const robotics::CheckOptions& options);

@@ -132,12 +132,6 @@ ErrorFigures error_figures(const Eigen::VectorXd& distances_mm) {
           .rms = distances_mm.norm() / std::sqrt(count)};
 }
 
-void remember_errors(CalibrationRecord& record, const Eigen::VectorXd& left_out_mm) {
-  const auto freedom = static_cast<double>(std::max<Eigen::Index>(1, left_out_mm.size() - 1));
-  record.held_out_mm = left_out_mm.mean();
-  record.held_out_sd_mm = (left_out_mm.array() - left_out_mm.mean()).matrix().norm() / std::sqrt(freedom);
-}
-
 CorrectedRobot CalibrationReport::best() const {
   CorrectedRobot robot{.robot = calibration.robot, .correction = {}};
   if (correction_kept) robot.correction = correction->model;
@@ -229,6 +223,17 @@ double far_limit(const Eigen::VectorXd& errors_mm) {
 }
 
 }  // namespace
+
+void remember_errors(CalibrationRecord& record, const Eigen::VectorXd& left_out_mm) {
+  const double limit = far_limit(left_out_mm);
+  std::vector<double> honest;
+  std::ranges::copy_if(left_out_mm, std::back_inserter(honest), [&](double error) { return error <= limit; });
+  // Errors of 0 have no limit.
+  const Eigen::VectorXd errors = honest.empty() ? left_out_mm : Eigen::VectorXd::Map(honest.data(), std::ssize(honest));
+  const auto freedom = static_cast<double>(std::max<Eigen::Index>(1, errors.size() - 1));
+  record.held_out_mm = errors.mean();
+  record.held_out_sd_mm = (errors.array() - errors.mean()).matrix().norm() / std::sqrt(freedom);
+}
 
 std::optional<Finding> far_readings(const Measurements& measurements, const CalibrationReport& report) {
   const bool is_held_out = report.geometric.held_out_mm.size() > 0;

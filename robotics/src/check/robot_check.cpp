@@ -6,10 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "calibration/free_parameters.hpp"
-#include "check/f_tail.hpp"
-#include "check/movements.hpp"
-#include "llmt/robotics/effects.hpp"
+#include "check/bad_readings.hpp"
+#include "check/moved_parameters.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -46,6 +44,10 @@ CorrectedRobot registered(CorrectedRobot robot, const Measurements& measurements
   return robot;
 }
 
+CorrectedRobot as_set_up(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options) {
+  return options.same_session ? robot : registered(robot, measurements, {});
+}
+
 double mean_distance(double noise_mm, const Measurements& measurements) {
   // Mean lengths of normal noise in one, two, three coordinates.
   constexpr double factors[] = {0.797885, 1.253314, 1.595769};
@@ -78,151 +80,12 @@ void set_limit(const Robot& robot, const Measurements& measurements, const Check
   result.limit_mm = std::max(immaterial * result.accuracy_mm, result.accuracy_mm + one_in_a_hundred * error);
 }
 
-// Columns of the Jacobian that take part: all but joint maps and what the convention leaves out.
-std::vector<Eigen::Index> columns_of(const Robot& robot) {
-  const std::vector<std::string> reasons = reasons_to_fix(robot, {});
-  const std::set<std::string> unseen = unseen_by_touch(robot);
-  const std::vector<discovery::Parameter> all = parameters(robot);
-  std::vector<Eigen::Index> columns;
-  Eigen::Index next = 0;
-  for (; next < geometric_parameter_count(robot.chain); ++next) {
-    if (reasons[next].empty() && !unseen.contains(all[next].name)) columns.push_back(next);
-  }
-  for (const Effect& effect : robot.effects) {
-    for (std::size_t k = 0; k < effect.values.size(); ++k, ++next) {
-      if (nature_of(effect) != Nature::map) columns.push_back(next);
-    }
-  }
-  return columns;
-}
-
-// Bases of any session, and of any target: "base@tuesday.x" belongs to a base.
-bool is_of_base(const std::string& name) { return name.starts_with("base.") || name.starts_with("base@"); }
-
-bool is_turn_of_tool(const std::string& name) {
-  return (name.starts_with("tool.") || name.starts_with("tool@")) && name[name.rfind('.') + 1] == 'r';
-}
-
-// Every parameter, and groups of those of an effect, of the tool's position, of the base.
-std::vector<Suspect> suspects_of(const std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
-                                 bool same_session) {
-  std::vector<Suspect> all;
-  std::vector<Suspect> groups;
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    const std::string& name = parameters[k].name;
-    if (!same_session && is_of_base(name)) continue;
-    if (is_turn_of_tool(name)) continue;
-    const auto column = static_cast<Eigen::Index>(k);
-    all.push_back({name, {column}});
-    const std::string owner = owner_of(name);
-    if (column < geometric && !is_frame_parameter(name)) continue;  // of a joint
-    const auto known = std::ranges::find(groups, owner, &Suspect::name);
-    if (known == groups.end()) {
-      groups.push_back({owner, {column}});
-    } else {
-      known->columns.push_back(column);
-    }
-  }
-  std::erase_if(groups, [](const Suspect& group) { return group.columns.size() < 2; });
-  all.insert(all.end(), groups.begin(), groups.end());
-  return all;
-}
-
-// The covariance of the calibrated values over their scales; columns of `nuisance` count as exact, for they are fitted
-// anew.
-Eigen::MatrixXd covariance_of(const Robot& robot, const std::vector<discovery::Parameter>& parameters,
-                              const std::vector<Eigen::Index>& nuisance) {
-  std::vector<Eigen::Index> place;
-  std::vector<double> error;
-  for (const IdentifiedParameter& entry : robot.identified) {
-    if (!entry.standard_error) continue;
-    const auto named = std::ranges::find(parameters, entry.name, &discovery::Parameter::name);
-    const Eigen::Index column = named == parameters.end() ? -1 : named - parameters.begin();
-    const bool is_exact = column < 0 || std::ranges::count(nuisance, column) > 0;
-    place.push_back(is_exact ? -1 : column);
-    error.push_back(is_exact ? 0.0 : *entry.standard_error / named->scale);
-  }
-  const Eigen::MatrixXd* correlations = robot.calibration ? &robot.calibration->correlations : nullptr;
-  const bool are_known = correlations != nullptr && correlations->rows() == std::ssize(place);
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(std::ssize(parameters), std::ssize(parameters));
-  for (std::size_t i = 0; i < place.size(); ++i) {
-    for (std::size_t k = 0; k < place.size(); ++k) {
-      if (place[i] < 0 || place[k] < 0 || (!are_known && i != k)) continue;
-      covariance(place[i], place[k]) = error[i] * error[k] * (are_known ? (*correlations)(i, k) : 1.0);
-    }
-  }
-  return covariance;
-}
-
-double mean_of_poses(const Eigen::VectorXd& stacked, const std::vector<Eigen::Index>& rows, Eigen::Index poses) {
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(poses);
-  for (Eigen::Index i = 0; i < stacked.size(); ++i) squares(rows[i] / 3) += stacked(i) * stacked(i);
-  return squares.cwiseSqrt().mean();
-}
-
-// `robot` has base and tool fitted to the measurements, `before` those of the calibration. Derivatives are taken at the
-// fitted ones: a target that was mounted elsewhere is far from the old one.
-void find_moved(const CorrectedRobot& robot, const Robot& before, const Measurements& measurements,
-                const CheckOptions& options, RobotCheck& result) {
-  const std::vector<Eigen::Index> rows = measured_rows(measurements);
-  const std::vector<Eigen::Index> columns = columns_of(robot.robot);
-  const std::vector<discovery::Parameter> all = robotics::parameters(robot.robot);
-  std::vector<discovery::Parameter> parameters;
-  for (const Eigen::Index column : columns) parameters.push_back(all[column]);
-  MovementProblem problem;
-  problem.level = options.level;
-  problem.jacobian = position_jacobian(robot.robot, measurements.poses, columns)(rows, Eigen::all);
-  for (std::size_t k = 0; k < parameters.size(); ++k) problem.jacobian.col(k) *= parameters[k].scale;
-  const Eigen::MatrixXd missing = (measurements.positions_mm - positions(robot, measurements.poses)).transpose();
-  problem.residuals = missing.reshaped()(rows);
-  const std::vector<discovery::Parameter> calibrated = robotics::parameters(before);
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    const double by = (parameters[k].value - calibrated[columns[k]].value) / parameters[k].scale;
-    if (!is_of_base(parameters[k].name)) problem.residuals += by * problem.jacobian.col(k);
-  }
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    if (!options.same_session && is_of_base(parameters[k].name)) {
-      problem.nuisance.push_back(static_cast<Eigen::Index>(k));
-    }
-  }
-  problem.covariance = covariance_of(robot.robot, parameters, problem.nuisance);
-  const Eigen::Index geometric =
-      std::ranges::lower_bound(columns, geometric_parameter_count(robot.robot.chain)) - columns.begin();
-  problem.suspects = suspects_of(parameters, geometric, options.same_session);
-  const Movements movements = find_movements(problem);
-  for (const Movement& movement : movements.found) {
-    const Suspect& suspect = problem.suspects[movement.suspect];
-    Moved moved{.name = suspect.name, .changes = {}, .probability = movement.probability, .or_else = {}};
-    for (std::size_t k = 0; k < suspect.columns.size(); ++k) {
-      const discovery::Parameter& parameter = parameters[suspect.columns[k]];
-      moved.changes.push_back({parameter.name, parameter.unit, movement.changes[k] * parameter.scale,
-                               movement.standard_errors[k] * parameter.scale});
-    }
-    for (const std::size_t other : movement.or_else) moved.or_else.push_back(problem.suspects[other].name);
-    result.moved.push_back(std::move(moved));
-  }
-  for (const std::size_t unseen : movements.unseen) result.unseen.push_back(problem.suspects[unseen].name);
-  result.tested = std::ssize(problem.suspects) - std::ssize(movements.unseen);
-  result.noise_mm = movements.noise;
-  result.refitted_mm = mean_of_poses(movements.left, rows, measurements.count());
-  if (!robot.robot.calibration) return;
-  const CalibrationRecord& record = *robot.robot.calibration;
-  result.noise_before_mm = record.noise_mm;
-  const double known = static_cast<double>(record.coordinates - record.correlations.rows());
-  if (!(movements.freedom > 0.0 && known > 0.0 && record.noise_mm > 0.0)) return;
-  constexpr double rare = 0.01;
-  constexpr double material = 1.33;
-  const double ratio = movements.noise / record.noise_mm;
-  result.unexplained = ratio > material && f_tail(ratio * ratio, movements.freedom, known) < rare;
-}
-
 RobotCheck check_all(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options) {
   RobotCheck result;
   set_limit(robot.robot, measurements, options, result);
   const CalibrationRecord* record = robot.robot.calibration ? &*robot.robot.calibration : nullptr;
   result.has_correlations = record != nullptr && record->correlations.size() > 0;
-  CorrectedRobot judged = robot;
-  if (!options.same_session) judged = registered(robot, measurements, {});
+  const CorrectedRobot judged = as_set_up(robot, measurements, options);
   result.errors_mm = distances(positions(judged, measurements.poses), measurements);
   result.error = result.covered_error = error_figures(result.errors_mm);
   result.still_good = result.good_where_covered = result.error.mean <= result.limit_mm;
@@ -256,10 +119,65 @@ RobotCheck decided_by_covered(const CorrectedRobot& robot, const Measurements& m
   return decided;
 }
 
-}  // namespace
+std::vector<Eigen::Index> left_of(Eigen::Index count, const std::vector<std::size_t>& out) {
+  std::vector<Eigen::Index> left;
+  for (Eigen::Index row = 0; row < count; ++row) {
+    if (std::ranges::count(out, static_cast<std::size_t>(row)) == 0) left.push_back(row);
+  }
+  return left;
+}
 
-RobotCheck check_robot(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options) {
-  check(robot, measurements, options);
+// Rows in ascending order. Base and tool are fitted anew without those found, until there are no more. Poses beyond the
+// calibrated ranges take no part: there the calibration may be wrong without anything being bad.
+std::vector<std::size_t> bad_rows(const CorrectedRobot& robot, const Measurements& measurements,
+                                  const CheckOptions& options) {
+  constexpr double level = 0.001;
+  constexpr Eigen::Index one_of = 5;
+  constexpr int most_rounds = 4;
+  std::vector<std::size_t> out;
+  if (robot.robot.calibration && !robot.robot.calibration->joint_ranges.empty()) {
+    for (const Eigen::Index row :
+         rows_beyond(joints_beyond(robot.robot.chain, robot.robot.calibration->joint_ranges, measurements.poses))) {
+      out.push_back(static_cast<std::size_t>(row));
+    }
+  }
+  Eigen::Index most = (measurements.count() - std::ssize(out)) / one_of;
+  std::vector<std::size_t> bad;
+  for (int round = 0; round < most_rounds && most > 0; ++round) {
+    const Measurements left = without_rows(measurements, out);
+    if (left.count() <= fewest_poses(options)) break;
+    const std::vector<Eigen::Index> places = left_of(measurements.count(), out);
+    const Linearised linear = linearised(as_set_up(robot, left, options), robot.robot, left, options);
+    std::vector<Eigen::Index> reading_of;
+    for (const Eigen::Index row : linear.rows) reading_of.push_back(row / 3);
+    const std::vector<Eigen::Index> found = bad_readings(linear.problem.jacobian, linear.problem.residuals, reading_of,
+                                                         std::min(most, left.count() - fewest_poses(options)), level);
+    if (found.empty()) break;
+    most -= std::ssize(found);
+    for (const Eigen::Index reading : found) {
+      bad.push_back(static_cast<std::size_t>(places[reading]));
+      out.push_back(bad.back());
+    }
+    std::ranges::sort(out);
+  }
+  std::ranges::sort(bad);
+  return bad;
+}
+
+bool is_of_frame(const std::string& name) {
+  return is_of_base(name + ".") || is_of_base(name) || name.starts_with("tool");
+}
+
+// Where the instrument was set up anew, a target that was mounted anew is no change of the arm.
+CheckVerdict verdict_of(const RobotCheck& check, const CheckOptions& options) {
+  if (!check.still_good) return CheckVerdict::no_longer_good;
+  const bool has_moved = std::ranges::any_of(
+      check.moved, [&](const Moved& moved) { return options.same_session || !is_of_frame(moved.name); });
+  return has_moved || check.unexplained ? CheckVerdict::moved_within_limits : CheckVerdict::still_good;
+}
+
+RobotCheck check_good_readings(const CorrectedRobot& robot, const Measurements& measurements,
+                               const CheckOptions& options) {
   RobotCheck result = check_all(robot, measurements, options);
   const CalibrationRecord* record = robot.robot.calibration ? &*robot.robot.calibration : nullptr;
   if (record == nullptr || record->joint_ranges.empty()) return result;
@@ -267,6 +185,41 @@ RobotCheck check_robot(const CorrectedRobot& robot, const Measurements& measurem
   result.uncovered = rows_beyond(result.beyond);
   if (!result.uncovered.empty()) result = decided_by_covered(robot, measurements, options, std::move(result));
   result.has_ranges = true;
+  return result;
+}
+
+}  // namespace
+
+std::string to_string(CheckVerdict verdict) {
+  switch (verdict) {
+    case CheckVerdict::still_good:
+      return "still good";
+    case CheckVerdict::moved_within_limits:
+      return "moved, within limits";
+    case CheckVerdict::no_longer_good:
+      return "no longer good";
+  }
+  return "";
+}
+
+RobotCheck check_robot(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options) {
+  check(robot, measurements, options);
+  const std::vector<std::size_t> bad = bad_rows(robot, measurements, options);
+  const Measurements good = without_rows(measurements, bad);
+  RobotCheck result = check_good_readings(robot, good, options);
+  result.judged = left_of(measurements.count(), bad);
+  for (Eigen::Index& row : result.uncovered) row = result.judged[row];
+  for (JointBeyond& joint : result.beyond) {
+    for (Eigen::Index& row : joint.rows) row = result.judged[row];
+  }
+  if (!bad.empty()) {
+    const Eigen::VectorXd errors =
+        distances(positions(as_set_up(robot, good, options), measurements.poses), measurements);
+    for (const std::size_t row : bad) {
+      result.bad.push_back({static_cast<Eigen::Index>(row), errors(static_cast<Eigen::Index>(row))});
+    }
+  }
+  result.verdict = verdict_of(result, options);
   return result;
 }
 

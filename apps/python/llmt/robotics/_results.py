@@ -168,9 +168,19 @@ class Check(_RobotResult):
         self._errors: list[float] = made["errors"]
 
     @property
+    def verdict(self) -> str:
+        """"still good"; "moved, within limits"; "no longer good"."""
+        return str(self._data["verdict"])
+
+    @property
     def still_good(self) -> bool:
         """Whether the mean error is within the limit."""
         return bool(self._data["still_good"])
+
+    @property
+    def bad(self) -> Any:
+        """Readings that the others contradict, which were left out: line and distance in mm."""
+        return table_of(self._data["bad"], ["line", "error_mm"])
 
     def __bool__(self) -> bool:
         return self.still_good
@@ -200,14 +210,14 @@ class Check(_RobotResult):
 
     @property
     def poses(self) -> Any:
-        """Distance in mm between model and measurement, a row for each measured point."""
+        """Distance in mm between model and measurement, a row for each point that was not left out."""
         return table_of([{"error_mm": error} for error in self._errors])
 
     def plot(self, ax: Any = None) -> Any:
         """Draws the error of every point and the limit of their mean. Returns the axes of matplotlib."""
         errors = {f"mean {self._data['error_mm']['mean']:.4f} mm": self._errors}
         limit = self._data["limit_mm"]
-        title = "Still good" if self.still_good else "No longer good"
+        title = self.verdict.capitalize()
         return _draw_errors(ax, errors, title, {f"limit of the mean {limit:.4f} mm": limit})
 
 

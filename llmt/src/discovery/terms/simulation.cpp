@@ -151,12 +151,15 @@ Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, cons
       const bool is_chance = chance.contains(found.term);
       if (!found.is_refuted && !fails_again && !is_narrow && !is_chance) continue;
       refuted.insert(found.term);
+      for (std::size_t t = 0; t < terms.size() && is_chance; ++t) {
+        if (terms[t].family == found.family) refuted.insert(t);  // of other inputs it would do the same
+      }
       const std::string place = found.location.empty() ? "" : " " + found.location;
       const std::string name = found.generic ? "an error pattern of" + place : found.family + place;
       notes.push_back(name + " was found and taken back: " +
-                      (is_narrow ? fmt::format("it is narrower than the errors of {}, or than its steps between rows",
-                                               found.location)
-                       : is_chance        ? "errors of the inputs can make such a state"
+                      (is_narrow   ? fmt::format("it is narrower than the errors of {}, or than its steps between rows",
+                                                 found.location)
+                       : is_chance ? "errors of the inputs can make such a state"
                        : found.is_refuted ? "it makes the error on rows set aside larger"
                                           : "it does not make the error on rows set aside smaller"));
     }

@@ -108,8 +108,7 @@ double jump_of(const Eigen::VectorXd& x, const Eigen::VectorXd& values, double b
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
   if (qr.rank() < columns.cols() || here.size() <= columns.cols()) return 0.0;
   const Eigen::VectorXd fit = qr.solve(here);
-  const double variance =
-      (here - columns * fit).squaredNorm() / static_cast<double>(here.size() - columns.cols());
+  const double variance = (here - columns * fit).squaredNorm() / static_cast<double>(here.size() - columns.cols());
   const double inverse = (columns.transpose() * columns).ldlt().solve(Eigen::VectorXd::Unit(columns.cols(), 0))(0);
   constexpr double rounding = 1e-9;
   if (std::abs(fit(0)) <= rounding * here.cwiseAbs().maxCoeff()) return 0.0;

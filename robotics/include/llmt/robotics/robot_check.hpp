@@ -40,10 +40,19 @@ struct Moved {
   std::vector<std::string> or_else;  ///< that would explain the measurements equally well
 };
 
-/// How good a robot is over all new poses, and which of them the calibration covers.
+enum class CheckVerdict {
+  still_good,           ///< the mean error is within the limit, and nothing moved
+  moved_within_limits,  ///< the mean error is within the limit, but a parameter, or what is no parameter, changed
+  no_longer_good        ///< the mean error is beyond the limit
+};
+
+/// "still good", "moved, within limits", "no longer good".
+std::string to_string(CheckVerdict verdict);
+
+/// How good a robot is over all good readings, and which of them the calibration covers.
 struct CheckedError {
   ErrorFigures error;         ///< mm, over the new poses; base and tool fitted to them unless it is the same session
-  Eigen::VectorXd errors_mm;  ///< n distances
+  Eigen::VectorXd errors_mm;  ///< distances, one for each row of RobotCheck::judged
   bool accuracy_is_of_noise = false;  ///< no error on poses left out was stored: from the noise of the poses fitted
   double accuracy_mm = 0.0;           ///< mean error that was stated, or that calibration had on poses left out
   double limit_mm = 0.0;              ///< mean error from which on the robot is no longer good
@@ -55,14 +64,23 @@ struct CheckedError {
   bool too_few_covered = false;         ///< to say what moved: RobotCheck::moved is empty
 };
 
+/// A reading that the others contradict.
+struct BadReading {
+  Eigen::Index row = 0;   ///< of the measurements
+  double error_mm = 0.0;  ///< its distance from the calibrated robot
+};
+
 struct RobotCheck : CheckedError {
-  ErrorFigures covered_error;       ///< mm, over the covered poses, base and tool fitted to them alone
-  bool good_where_covered = false;  ///< still_good of the covered poses
-  std::vector<Moved> moved_beyond;  ///< what the fit to all poses names, and the covered poses do not
-  std::vector<Moved> moved;         ///< in the order in which they were found
-  double refitted_mm = 0.0;         ///< mean error if what moved were identified anew
-  double noise_mm = 0.0;            ///< standard deviation of a coordinate that no change of the parameters explains
-  double noise_before_mm = 0.0;     ///< the same at calibration; 0: not known
+  CheckVerdict verdict = CheckVerdict::still_good;
+  std::vector<BadReading> bad;       ///< left out of everything else
+  std::vector<Eigen::Index> judged;  ///< rows of the other readings
+  ErrorFigures covered_error;        ///< mm, over the covered poses, base and tool fitted to them alone
+  bool good_where_covered = false;   ///< still_good of the covered poses
+  std::vector<Moved> moved_beyond;   ///< what the fit to all poses names, and the covered poses do not
+  std::vector<Moved> moved;          ///< in the order in which they were found
+  double refitted_mm = 0.0;          ///< mean error if what moved were identified anew
+  double noise_mm = 0.0;             ///< standard deviation of a coordinate that no change of the parameters explains
+  double noise_before_mm = 0.0;      ///< the same at calibration; 0: not known
   bool unexplained =
       false;                ///< noise_mm is larger beyond chance and by a third: something changed that is no parameter
   Eigen::Index tested = 0;  ///< number of parameters and groups
@@ -71,6 +89,10 @@ struct RobotCheck : CheckedError {
 };
 
 /// Judges a calibrated and maybe corrected robot by new measurements.
+///
+/// Bad readings. A reading is left out where the others contradict it whatever moved: with all parameters free, the
+/// shift of its coordinates takes so much of the squares by chance once in a thousand checks (F tests, times the number
+/// of readings; Rosner 1983). At most a fifth of the readings.
 ///
 /// The error. Without options.same_session base and tool are fitted. The limit is accuracy_mm if stated. Otherwise it
 /// is the mean error of the calibration on poses left out (or, if there were no folds, what its noise makes), times
@@ -89,6 +111,9 @@ struct RobotCheck : CheckedError {
 /// not determine looks like a change. Poses with a joint a tenth of its calibrated range or more beyond it are listed,
 /// and what moved is decided by the other poses, with base and tool fitted to them alone. What only the fit to all
 /// poses names stands apart.
+///
+/// The verdict. The mean error of all good readings decides whether the robot is good. Where the instrument was set up
+/// anew a target that was mounted anew counts as no change.
 ///
 /// Throws std::invalid_argument for options out of range, fewer than 8 poses (5 in the same session), a robot without
 /// identified parameters or without a record of its accuracy, or measurements that do not suit the robot.
