@@ -123,7 +123,7 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
   if (run.task.quality) {
     run.details = calibration_details(run.nominal, measurements, run.report, run.task.options);
   }
-  run.is_implausible = robotics::is_implausible(run.nominal, run.report) || !is_accepted(run);
+  run.is_implausible = robotics::is_implausible(run.nominal, run.measurements, run.report) || !is_accepted(run);
   if (run.task.quality || (run.task.page && !run.is_implausible)) {
     const robotics::ReportOptions& options = run.task.options;
     run.learning = robotics::learning_curve(run.nominal, measurements, options.calibration, 3, options.seed);

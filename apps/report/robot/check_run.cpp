@@ -44,7 +44,7 @@ robotics::RobotCheck run_check(const std::string& robot_file, const std::string&
     throw NotEvaluated(fmt::format("{}, {}: {}", robot_file, data, error.what()));
   }
   constexpr double implausible_share = 0.02;
-  if (check.error.mean > implausible_share * robotics::reach_of(robot.robot.chain)) {
+  if (check.error.mean > implausible_share * robotics::size_of(robot.robot.chain, measurements)) {
     throw NotEvaluated(fmt::format(
         "{}: the robot misses the points by {:.0f} mm on average, base and tool {}: these are not measurements of it; "
         "check units, signs and order of the columns",

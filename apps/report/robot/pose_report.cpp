@@ -167,10 +167,13 @@ std::string poses_text(const PoseFacts& facts, std::size_t width) {
     text += fmt::format("Taken as known, because the poses lack the columns that they depend on: {}\n",
                         fmt::join(selection.left_out, ", "));
   }
+  const bool has_slides = std::ranges::find(robot.chain.joints, robotics::JointType::prismatic,
+                                            &robotics::Joint::type) != robot.chain.joints.end();
   text += fmt::format(
-      "Order: from each pose to the nearest one; the largest joint moves add up to {} degrees. Collisions "
+      "Order: from each pose to the nearest one; the largest joint moves add up to {} degrees{}. Collisions "
       "and the line of sight are not checked.\n",
-      number(selection.travel_deg, 4));
+      number(selection.travel_deg, 4),
+      has_slides ? " (a slide counts by the angle at which its way is seen from as far as the machine reaches)" : "");
   return text;
 }
 

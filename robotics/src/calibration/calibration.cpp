@@ -11,6 +11,7 @@
 #include "calibration/free_parameters.hpp"
 #include "calibration/joint_map_shift.hpp"
 #include "calibration/joint_ranges.hpp"
+#include "calibration/machine_size.hpp"
 #include "calibration/noise_model.hpp"
 #include "calibration/still_joints.hpp"
 #include "linear_algebra/linear_algebra.hpp"
@@ -78,8 +79,8 @@ Fit begun_without_priors(const Fit& fit, const discovery::LeastSquaresProblem& u
 
 // By more than a fiftieth of the arm's length, as input_mistakes() has it, but not so far that it is another arm, or a
 // table that is not meant as it stands.
-bool is_far_off(const Chain& chain, const CommonNoise& registered) {
-  const double share = std::sqrt(3.0) * registered.position_mm / reach_of(chain);
+bool is_far_off(double reach_mm, const CommonNoise& registered) {
+  const double share = std::sqrt(3.0) * registered.position_mm / reach_mm;
   constexpr double far = 0.02;
   constexpr double too_far = 0.25;
   return share > far && share < too_far;
@@ -96,13 +97,13 @@ void identify(Calibration& calibration, const Measurements& measurements,
   set_priors(start.problem.parameters, geometric_parameter_count(calibration.robot.chain), options);
   Fit fit = start;
   fit_until_noise_settles(fit, model, reasons, options.solver, is_weighed ? 10 : 1);
-  if (has_priors && is_far_off(start.robot.chain, start.noise)) {
+  const double reach_mm = reach_of(calibration.robot.chain) + travel_of(calibration.robot.chain, measurements.poses);
+  if (has_priors && is_far_off(reach_mm, start.noise)) {
     Fit other = begun_without_priors(fit, unweighted, model, reasons, options);
     constexpr double better = 0.9;
     constexpr double plausible = 0.002;  // of the arm's length, mm per coordinate
     calibration.began_without_priors =
-        other.noise.position_mm <
-        std::min(better * fit.noise.position_mm, plausible * reach_of(calibration.robot.chain));
+        other.noise.position_mm < std::min(better * fit.noise.position_mm, plausible * reach_mm);
     if (calibration.began_without_priors) fit = std::move(other);
   }
   calibration.robot = std::move(fit.robot);

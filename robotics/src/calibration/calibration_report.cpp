@@ -138,9 +138,9 @@ CorrectedRobot CalibrationReport::best() const {
   return robot;
 }
 
-bool is_implausible(const Robot& nominal, const CalibrationReport& report) {
+bool is_implausible(const Robot& nominal, const Measurements& measurements, const CalibrationReport& report) {
   if (has_wrong_orientations(report)) return true;
-  return median(report.geometric.in_sample_mm) > implausible_share * length_of(nominal.chain);
+  return median(report.geometric.in_sample_mm) > implausible_share * size_of(nominal.chain, measurements);
 }
 
 std::vector<Finding> input_mistakes(const Robot& robot, const Measurements& measurements,
@@ -150,7 +150,7 @@ std::vector<Finding> input_mistakes(const Robot& robot, const Measurements& meas
     found.push_back(finding(code, std::move(sentence)));
     found.back().is_mistake = true;
   };
-  const double length_mm = length_of(robot.chain);
+  const double length_mm = size_of(robot.chain, measurements);
   for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
     const Joint& joint = robot.chain.joints[j];
     if (!joint.limits) continue;
@@ -185,7 +185,7 @@ std::vector<Finding> input_mistakes(const Robot& robot, const Measurements& meas
   const double calibrated = (is_held_out ? report.geometric.held_out_mm : report.geometric.in_sample_mm).mean();
   if (calibrated > implausible_mm) {
     add("calibrated_misses",
-        fmt::format("the calibrated robot still misses the {} by {:.4g} mm on average, {:.0f} % of the arm's length: "
+        fmt::format("the calibrated robot still misses the {} by {:.4g} mm on average, {:.0f} % of the machine's size: "
                     "this description does not belong to these measurements, and the identified values mean nothing; "
                     "check units, signs and zeros of the joints, their order, and whether it is this robot",
                     is_held_out ? "held-out points" : "measured points", calibrated, 100.0 * calibrated / length_mm));

@@ -250,9 +250,11 @@ std::optional<Suspicion> likely_mistake(const Robot& robot, const Measurements& 
   // Fewer poses than base and tool take fit with any mistake, and rounding is none.
   constexpr Eigen::Index fewest_poses = 10;
   constexpr double rounding = 1e-6;  // of the arm's length
-  if (distinct_poses(measurements.poses) < fewest_poses || !(misfit_mm > rounding * length_of(robot.chain))) return {};
+  if (distinct_poses(measurements.poses) < fewest_poses || !(misfit_mm > rounding * size_of(robot.chain, measurements)))
+    return {};
   const auto explains = [&](const Explanation& own, const Chain& chain) {
-    return own.share < std::min(far_better * share, of_spread) && own.misfit_mm < plausible_share * length_of(chain);
+    return own.share < std::min(far_better * share, of_spread) &&
+           own.misfit_mm < plausible_share * size_of(chain, measurements);
   };
   std::vector<Explanation> found;
   const auto try_all = [&](const Candidate& before, const std::vector<Change>& changes) {

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "calibration/machine_size.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/robotics/calibration.hpp"
 
@@ -56,7 +57,7 @@ void add_angles(const Chain& chain, std::vector<Change>& changes) {
 
 // Units of all lengths. What is a thousand times too small or too large is the description where no arm is of its size,
 // else the table.
-void add_lengths(const Chain& chain, std::vector<Change>& changes) {
+void add_lengths(const Chain& chain, const Poses& poses, std::vector<Change>& changes) {
   const auto stretch = [](double factor) { return [factor](Measurements& table) { table.positions_mm *= factor; }; };
   const auto described_stretch = [](double factor, bool with_tool) {
     return [factor, with_tool](Chain& meant) {
@@ -69,7 +70,7 @@ void add_lengths(const Chain& chain, std::vector<Change>& changes) {
   constexpr double shortest_mm = 20.0;
   constexpr double longest_mm = 1e5;
   constexpr double mm_of_an_inch = 25.4;
-  const double length_mm = length_of(chain);
+  const double length_mm = reach_of(chain) - chain.tool.xyz_mm.norm() + travel_of(chain, poses);
   for (const bool with_tool : {true, false}) {
     if (length_mm < shortest_mm) {
       changes.push_back({"description_metres", "the lengths of the description are metres, not millimetres",
@@ -175,12 +176,10 @@ void add_convention(const Chain& chain, std::vector<Change>& changes) {
 
 }  // namespace
 
-double length_of(const Chain& chain) { return reach_of(chain) - chain.tool.xyz_mm.norm(); }
-
 std::vector<Change> single_changes(const Chain& chain, const Poses& poses) {
   std::vector<Change> changes;
   add_angles(chain, changes);
-  add_lengths(chain, changes);
+  add_lengths(chain, poses, changes);
   changes.push_back({"axes", "x and y of the measured points are exchanged, or an axis of the instrument is reversed",
                      [](Measurements& table) { table.positions_mm.col(0).swap(table.positions_mm.col(1)); }});
   for (std::size_t j = 0; j < chain.joints.size(); ++j) {

@@ -17,9 +17,6 @@ struct Change {
   std::function<void(Chain&)> describe = {};  ///< empty: the description is right
 };
 
-/// Sum of the lengths of the links without the tool, mm: it may have been fitted to anything.
-double length_of(const Chain& chain);
-
 /// Units of angles, of positions, of the description and of one target's points; an axis of the instrument; signs,
 /// zeros, order and coupling of the joints; the convention of the description.
 std::vector<Change> single_changes(const Chain& chain, const Poses& poses);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "calibration/joint_map_shift.hpp"
+#include "calibration/machine_size.hpp"
 #include "calibration/still_joints.hpp"
 #include "discovery/gap_map.hpp"
 #include "discovery/input_mistakes.hpp"
@@ -56,15 +57,15 @@ void check_freedom(const Measurements& samples, const Calibration& baseline) {
 // Throws if the error is larger than any effect makes it: wrong units, order or signs of joints, another robot, too
 // many lost beams. The nominal chain is the measure: a tool that was fitted to nonsense may be metres long.
 void check_plausible(const Robot& nominal, const Robot& calibrated, const Measurements& samples) {
-  const double reach = reach_of(nominal.chain);
+  const double reach = reach_of(nominal.chain) + travel_of(nominal.chain, samples.poses);
   const double typical = median(distances(positions(calibrated, samples.poses), samples));
   constexpr double implausible = 0.02;
   if (reach > 0.0 && typical > implausible * reach) {
-    throw std::runtime_error(
-        fmt::format("the calibrated model misses the measurements by {:.4g} mm, {:.0f} % of the arm's reach: no effect "
-                    "does that. Check "
-                    "units, order, signs and zeros of the joints, the axes of the instrument, and the description",
-                    typical, 100.0 * typical / reach));
+    throw std::runtime_error(fmt::format(
+        "the calibrated model misses the measurements by {:.4g} mm, {:.0f} % of the machine's size: no effect "
+        "does that. Check "
+        "units, order, signs and zeros of the joints, the axes of the instrument, and the description",
+        typical, 100.0 * typical / reach));
   }
 }
 

@@ -19,8 +19,14 @@ Chain without_base(Chain chain) {
 // Joint values in one degree.
 Eigen::VectorXd degree_of(const Chain& chain) {
   Eigen::VectorXd unit(std::ssize(chain.joints));
+  double reach = reach_of(chain);
+  // A machine of slides alone reaches as far as these.
+  for (std::size_t j = 0; j < chain.joints.size() && reach_of(chain) == 0.0; ++j) {
+    const Joint& joint = chain.joints[j];
+    if (joint.type == JointType::prismatic && joint.limits) reach += joint.limits->at(1) - joint.limits->at(0);
+  }
   for (Eigen::Index j = 0; j < unit.size(); ++j) {
-    unit(j) = chain.joints[j].type == JointType::revolute ? radians : radians * reach_of(chain);
+    unit(j) = chain.joints[j].type == JointType::revolute ? radians : radians * reach;
   }
   return unit;
 }

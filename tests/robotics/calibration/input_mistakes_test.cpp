@@ -164,7 +164,7 @@ TEST(LikelyMistake, TheOrderOfQuaternionsAndTheirDirectionAreNamed) {
     const CalibrationReport report = report_calibration(ur_like(), seen, {.folds = 0});
     std::string all;
     for (const Finding& mistake : input_mistakes(ur_like(), seen, report)) all += mistake.words({}) + "\n";
-    return std::to_string(static_cast<int>(is_implausible(ur_like(), report))) + all;
+    return std::to_string(static_cast<int>(is_implausible(ur_like(), seen, report))) + all;
   };
   using Q = Eigen::Quaterniond;
   EXPECT_EQ(said_of([](const Q& q) { return Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()); }), "0");

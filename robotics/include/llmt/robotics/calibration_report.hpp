@@ -87,9 +87,14 @@ std::vector<Finding> input_mistakes(const Robot& robot, const Measurements& meas
 /// the 85 % quantile of these. calibrate_robustly() leaves such readings out.
 std::optional<Finding> far_readings(const Measurements& measurements, const CalibrationReport& report);
 
-/// Whether the calibrated robot still misses half of the measured points by more than a fiftieth of the nominal arm's
-/// length: the identified values mean nothing then.
-bool is_implausible(const Robot& nominal, const CalibrationReport& report);
+/// Whether the calibrated robot still misses half of the measured points by more than a fiftieth of the nominal
+/// machine's size_of(): the identified values mean nothing then.
+bool is_implausible(const Robot& nominal, const Measurements& measurements, const CalibrationReport& report);
+
+/// How large a machine is, as a measure of its errors, mm: the lengths of all links without the tool and the travel of
+/// the slides in these poses. Where both are 0, as of a turntable: the root mean square distance of the measured points
+/// from their mean.
+double size_of(const Chain& chain, const Measurements& measurements);
 
 /// Calibrates a robot, with the correction if asked for, on all poses and in every fold. Throws as calibrate() and
 /// make_folds().

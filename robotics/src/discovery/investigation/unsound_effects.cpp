@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "calibration/free_parameters.hpp"
+#include "calibration/machine_size.hpp"
 #include "discovery/investigation/jacobian_range.hpp"
 #include "discovery/investigation/pose_split.hpp"
 #include "linear_algebra/linear_algebra.hpp"
@@ -45,7 +46,7 @@ bool is_of_plausible_size(const Robot& robot, const Effect& effect, const Measur
   if (std::ranges::any_of(effect.values, is_too_large)) return false;
   const Eigen::MatrixXd moved = positions(robot, kept.poses) - positions(without_effect(robot, effect), kept.poses);
   const double typical = moved.norm() / std::sqrt(static_cast<double>(kept.count()));
-  return typical <= most_of_reach * reach_of(robot.chain) &&
+  return typical <= most_of_reach * (reach_of(robot.chain) + travel_of(robot.chain, kept.poses)) &&
          beyond_geometry(robot, effect, kept).norm() <= most_cancelled * missing;
 }
 
