@@ -63,8 +63,8 @@ std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string&
 ///   b/k.
 ///   resonance -share (s - H s), H(p) = (2 zeta w p + w^2) / (p^2 + 2 zeta w p + w^2), p = d/dt, w = 2 pi frequency:
 ///   this share of the simulated output moves a load behind a spring and damper, which rings. Frequency and damping
-///   ratio zeta are searched, zeta below 0.16: what is damped more is rather a filter. Exact for a signal that is a
-///   straight line between rows.
+///   ratio zeta are searched, zeta below 0.16: what is damped more is rather a filter; the frequency up to
+///   Inputs::cutoff. Exact for a signal that is a straight line between rows.
 ///   resonance x   (H - 1) x of a speed or an acceleration x: a load that swings, from a tenth of the frequency of the
 ///   motion to twice as much.
 ///   lag           z - s, tau dz/dt = s - z; for a negative tau -tau ds/dt, the command of a slow actuator.

@@ -255,7 +255,10 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
     terms.push_back(delay(of_rows, surrogate, rows, inputs.cutoff > 0.0, outputs[o], place));
     Rows here = rows;
     here.simulated = output;
-    if (std::vector<double> frequencies = resonant_frequencies(here); !frequencies.empty()) {
+    std::vector<double> frequencies = resonant_frequencies(here);
+    // What rings above the cutoff is not in the rows: such a term would take noise out of the simulation.
+    if (inputs.cutoff > 0.0) std::erase_if(frequencies, [&](double f) { return f > inputs.cutoff; });
+    if (!frequencies.empty()) {
       terms.push_back(resonance(outputs[o], std::move(frequencies)));
       terms.back().lower = Eigen::VectorXd::Zero(1);
       terms.back().upper = Eigen::VectorXd::Ones(1);
