@@ -21,6 +21,7 @@
 #include "discovery/judges/findings.hpp"
 #include "discovery/judges/judges.hpp"
 #include "discovery/judges/wave_harmonics.hpp"
+#include "discovery/refits.hpp"
 #include "discovery/verification.hpp"
 #include "llmt/statistics.hpp"
 
@@ -268,6 +269,16 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
     objections = judge(found, options);
   }
   Robots robots = fit_robots(robot, split.samples, plain.maps, found, options);
+  if (robots.is_worse && !found.maps.empty()) {
+    // What was found before the maps may stand without them.
+    DiscoveryOptions without_maps = options;
+    without_maps.maps = false;
+    found = search(calibrated(robot, plain, without_maps, work), without_maps);
+    objections = judge(found, without_maps);
+    robots = fit_robots(robot, split.samples, plain.maps, found, without_maps);
+    found.notes.emplace_back(
+        "Free maps of the joints were tried and taken back: the refit with them did not converge to anything better.");
+  }
   Notes notes = found.notes;
   for (const Objection& one : objections) add(one.notes, notes);
   add(input_mistakes(plain.robot, found.investigation, unmapped(robot, split.test).measurements,
@@ -278,7 +289,9 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
   if (const auto note = far_poses_note(robots, split)) notes.push_back(*note);
   if (robots.is_worse) forget_names(found, objections);
   const std::optional<PairedDifference> gain = held_out_gain(robots, split);
-  const std::optional<Objection> loss = judge_held_out_loss(gain, found.names.size());
+  const Refits refits = robots.is_worse ? Refits{} : refits_of(robots, split, found, options);
+  if (const std::optional<Objection> fails = judge_refits(refits)) objections.push_back(*fails);
+  const std::optional<Objection> loss = judge_held_out_loss(refits.gain ? refits.gain : gain, found.names.size());
   const bool is_withdrawn = robots.is_worse || loss;
   if (loss) {
     objections.push_back(*loss);
@@ -288,6 +301,11 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
   const double noise_mm = noise_of(found);
   Discovery result = described(of_robots(std::move(robots), split, lack_of_fit, noise_mm), found, objections, split);
   result.held_out.gain = gain.value_or(PairedDifference{});
+  for (std::size_t k = 0; k < std::min(result.effects.size(), refits.names.size()); ++k) {
+    result.effects[k].refits = refits.count;
+    result.effects[k].held = refits.names[k].held;
+    result.effects[k].ranges = refits.names[k].ranges;
+  }
   result.withdrawn = is_withdrawn;
   result.lack_of_fit = lack_of_fit;
   result.noise_mm = noise_mm;

@@ -34,8 +34,9 @@ Robots withdrawn(Robots robots);
 /// nothing was found that could be written.
 std::optional<PairedDifference> held_out_gain(const Robots& robots, const PoseSplit& split);
 
-/// Objection to all names if the mean of the gain is not above 0. A gain within two standard errors is no objection:
-/// the poses searched speak for the names, and those set aside do not speak against them.
+/// Objection to all names if the mean of the gain, of readings that took no part, is not above 0. A gain within two
+/// standard errors is no objection: the poses searched speak for the names, and those set aside do not speak against
+/// them.
 std::optional<Objection> judge_held_out_loss(const std::optional<PairedDifference>& gain, std::size_t names);
 
 /// A sentence on poses set aside that are far off, such as lost beams, if there are any. They are not removed: no

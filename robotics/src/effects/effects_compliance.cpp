@@ -66,6 +66,17 @@ std::string payload_alone(const TrialContext& context, std::size_t joint) {
   return is_alone ? "payload" : "";
 }
 
+// With masses unknown and one payload the known torque is that of the payload alone, and so would be the compliance's
+// size: that of the joint needs all of the torque.
+bool has_all_of_the_torque(const TrialContext& context, std::size_t joint) {
+  const auto payload = context.covariates.find("payload_kg");
+  const bool is_of_payload =
+      payload != context.covariates.end() && payload->second.size() > 0 &&
+      payload->second.maxCoeff() == payload->second.minCoeff() &&
+      std::ranges::all_of(from(context.chain, joint), [](const Joint& body) { return body.mass_kg == 0.0; });
+  return !is_of_payload;
+}
+
 // Free masses have three unknowns per body and imitate many other effects: they are tried only where masses are
 // unknown.
 bool has_unknown_masses(const TrialContext& context, std::size_t joint) {
@@ -91,7 +102,7 @@ std::vector<EffectType> compliance_effects() {
        .nature = Nature::weight,
        .scales_with_mass = true,
        .elastic = true,
-       .trial = {.part = payload_alone},
+       .trial = {.is_worth_it = has_all_of_the_torque, .part = payload_alone},
        .in_c = {.expression = joint_compliance_in_c}},
       {.name = "joint_compliance_stiffening",
        .family = "joint_compliance",
@@ -107,7 +118,7 @@ std::vector<EffectType> compliance_effects() {
        .elastic = true,
        .refusal = [](const Chain&, std::size_t,
                      Values constants) { return must_be_positive("stiffens_at", constants[0]); },
-       .trial = {.constants = bends_to_try},
+       .trial = {.constants = bends_to_try, .is_worth_it = has_all_of_the_torque},
        .in_c = {.expression = joint_compliance_stiffening_in_c}},
       {.name = "joint_compliance_measured",
        .family = "joint_compliance",

@@ -19,6 +19,9 @@ const std::map<std::string, Reason> against_verdict = {{"gross errors", Reason::
                                                        {"worse fit", Reason::worse_fit},
                                                        {"held-out loss", Reason::held_out_loss}};
 const std::map<std::string, Reason> against_names = {{"undetermined", Reason::undetermined},
+                                                     {"still joint", Reason::still_joint},
+                                                     {"both signs", Reason::both_signs},
+                                                     {"refits", Reason::refits},
                                                      {"part of the unknown", Reason::part_of_unknown},
                                                      {"error of a larger effect", Reason::error_of_larger},
                                                      {"instrument residuals", Reason::instrument_residuals}};

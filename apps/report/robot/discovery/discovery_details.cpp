@@ -15,6 +15,18 @@ namespace {
 using robotics::Discovery;
 using robotics::FoundEffect;
 
+// "holds in 5 of 5 refits without a fifth of the poses: compliance 43 to 46 urad/(N m)".
+std::string refits_words(const FoundEffect& effect) {
+  std::vector<std::string> ranges;
+  for (std::size_t k = 0; k < effect.ranges.size() && effect.parameters.size() <= 2; ++k) {
+    const auto [low, high] = effect.ranges[k];
+    const robotics::FoundParameter& parameter = effect.parameters[k];
+    ranges.push_back(fmt::format("{} {}", parameter.name, range_with_unit(low, high, parameter.unit)));
+  }
+  return fmt::format("holds in {} of {} refits without a fifth of the poses{}{}", effect.held, effect.refits,
+                     ranges.empty() ? "" : ": ", fmt::join(ranges, ", "));
+}
+
 // Every effect with all that is known of it.
 std::string effect_lines(const Discovery& found) {
   std::string text;
@@ -27,6 +39,7 @@ std::string effect_lines(const Discovery& found) {
     const std::string values = effect_values(found, effect);
     if (!values.empty()) text += fmt::format("    {}\n", values);
     text += fmt::format("    moves the tool by {:.4f} mm\n", effect.rms_mm);
+    if (effect.refits > 0) text += fmt::format("    {}\n", refits_words(effect));
     for (std::size_t k = 0; k < effect.rivals.size(); ++k) {
       text += fmt::format("    instead it may be: {} [{}]\n", rival_words(effect, k), effect.rivals[k]);
     }

@@ -29,6 +29,8 @@ Json effects_json(const robotics::Discovery& found) {
                        {"rivals", effect.rivals},
                        {"exact_alias", effect.exact_alias},
                        {"smaller", effect.smaller},
+                       {"refits", effect.refits},
+                       {"held", effect.held},
                        {"share", effect.share},
                        {"rms_mm", effect.rms_mm}});
   }

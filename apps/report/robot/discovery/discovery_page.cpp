@@ -89,9 +89,21 @@ std::vector<std::string> refused_sentences(const Discovery& found) {
   return sentences;
 }
 
+// What explains most: squares of what geometry and the other effects cannot imitate, summed over places.
+std::string largest_sentence(const Discovery& found) {
+  const double squares = found.fitted_before.rms * found.fitted_before.rms;
+  if (found.effects.empty() || found.withdrawn || !(squares > 0.0)) return "";
+  std::map<std::string, double> of_title;
+  for (const FoundEffect& effect : found.effects) of_title[effect.title] += effect.rms_mm * effect.rms_mm;
+  const auto largest = std::ranges::max_element(of_title, {}, [](const auto& entry) { return entry.second; });
+  return fmt::format("Of what has a name, \"{}\" explains most: {:.0f} % of the squared error at the poses searched.",
+                     largest->first, 100.0 * std::min(1.0, largest->second / squares));
+}
+
 std::vector<std::string> error_sentences(const Discovery& found) {
   const robotics::HeldOut& held = found.held_out;
   std::vector<std::string> lines;
+  if (const std::string largest = largest_sentence(found); !largest.empty()) lines.push_back(largest);
   if (held.poses == 0) {
     lines.push_back(fmt::format("Mean error on the poses searched, none set aside: {:.4f} -> {:.4f} mm.",
                                 found.fitted_before.mean, found.fitted_after.mean));

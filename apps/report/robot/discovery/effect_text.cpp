@@ -43,7 +43,15 @@ std::string constants_text(const robotics::Effect& effect, const std::optional<d
 
 }  // namespace
 
-std::string with_unit(double value, double error, const std::string& unit) {
+namespace {
+
+struct Scaled {
+  double factor = 1.0;
+  std::string unit;
+};
+
+// The unit in which a value has a digit or more in front of its point.
+Scaled scaled(double value, const std::string& unit) {
   struct Prefix {
     double factor;
     const char* name;
@@ -55,12 +63,22 @@ std::string with_unit(double value, double error, const std::string& unit) {
       if (std::abs(value) * best.factor < 0.1) best = prefix;
     }
   }
-  const std::string name =
-      unit.starts_with("1/") ? (best.factor == 1.0 ? unit : fmt::format("1e-{:.0f} {}", std::log10(best.factor), unit))
-                             : best.name + unit;
-  if (!std::isfinite(error)) return fmt::format("{} {} (not determined)", number(value * best.factor, 3), name);
+  if (!unit.starts_with("1/")) return {best.factor, best.name + unit};
+  return {best.factor, best.factor == 1.0 ? unit : fmt::format("1e-{:.0f} {}", std::log10(best.factor), unit)};
+}
+
+}  // namespace
+
+std::string with_unit(double value, double error, const std::string& unit) {
+  const auto [factor, name] = scaled(value, unit);
+  if (!std::isfinite(error)) return fmt::format("{} {} (not determined)", number(value * factor, 3), name);
   if (unit == "1") return fmt::format("{} +- {}", number(value, 3), number(error, 2));
-  return fmt::format("{} +- {} {}", number(value * best.factor, 3), number(error * best.factor, 2), name);
+  return fmt::format("{} +- {} {}", number(value * factor, 3), number(error * factor, 2), name);
+}
+
+std::string range_with_unit(double low, double high, const std::string& unit) {
+  const auto [factor, name] = scaled(std::abs(low) > std::abs(high) ? low : high, unit);
+  return fmt::format("{} to {}{}", number(low * factor, 3), number(high * factor, 3), unit == "1" ? "" : " " + name);
 }
 
 std::string place_of(const robotics::FoundEffect& effect) {

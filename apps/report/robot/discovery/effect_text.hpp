@@ -14,6 +14,9 @@ namespace llmt::report {
 /// A value with its error in the unit that needs no exponent: 1.1e-6 rad/(N m) is 1.10 +- 0.05 urad/(N m).
 std::string with_unit(double value, double error, const std::string& unit);
 
+/// "43 to 46 urad/(N m)".
+std::string range_with_unit(double low, double high, const std::string& unit);
+
 /// "joint2", "the whole arm".
 std::string place_of(const robotics::FoundEffect& effect);
 

@@ -52,7 +52,7 @@ std::string cause(const Discovery& found) {
     case discovery::Answer::indistinguishable:
       return fmt::format("The model lacks: {}; or something that looks alike at these poses", fmt::join(names, "; "));
     case discovery::Answer::unknown:
-    case discovery::Answer::undecided:  // of no robot, as the next
+    case discovery::Answer::undecided:        // of no robot, as the next
     case discovery::Answer::failed_held_out:  // of no robot
     case discovery::Answer::parameters_only:
     case discovery::Answer::inner_state:

@@ -17,10 +17,13 @@ enum class Reason {
   worse_fit,             ///< fitted with what was found, the robot misses more than without it
   held_out_loss,         ///< what was found does not make the poses set aside better; speaks against every name
   // Against single names only.
-  undetermined,          ///< all values are within two standard errors of zero
+  undetermined,          ///< all values are within two standard errors of zero, or not known
   part_of_unknown,       ///< the name may be a part of what has no name
   error_of_larger,       ///< a small effect that may be the error of a large one
   instrument_residuals,  ///< the residuals are like an instrument's errors, whose image an effect of the arm may be
+  still_joint,           ///< an effect of a joint that stands still
+  both_signs,            ///< compliances of both signs in one arm
+  refits,                ///< it does not hold in four of five refits that leave out a fifth of the poses each
 };
 
 /// The result of a judge.

@@ -7,6 +7,7 @@
 #include <functional>
 #include <utility>
 
+#include "calibration/still_joints.hpp"
 #include "discovery/judges/residual_tests.hpp"
 
 namespace llmt::robotics {
@@ -20,9 +21,25 @@ Objection against(Reason reason, const std::vector<Name>& names, const std::func
   return objection;
 }
 
-bool is_undetermined(const Name& name) {
-  return std::ranges::all_of(name.effect.parameters,
-                             [](const FoundParameter& one) { return std::abs(one.value) < 2.0 * one.standard_error; });
+// A value that was held has no standard error.
+bool is_known(const FoundParameter& one) { return one.value != 0.0 && std::abs(one.value) >= 2.0 * one.standard_error; }
+
+bool is_undetermined(const Name& name) { return std::ranges::none_of(name.effect.parameters, is_known); }
+
+// Compliances of gears and controllers. A controller may count torques with either sign, but all with one.
+bool is_compliance(const Name& name) {
+  const std::string& type = name.effect.effect.type;
+  return effect_type(type).family == "joint_compliance" && name.effect.parameters.size() == 1;
+}
+
+bool has_both_signs(const std::vector<Name>& names) {
+  const auto has = [&](double sign) {
+    return std::ranges::any_of(names, [&](const Name& name) {
+      return is_compliance(name) && is_known(name.effect.parameters.front()) &&
+             sign * name.effect.parameters.front().value > 0.0;
+    });
+  };
+  return has(1.0) && has(-1.0);
 }
 
 // An effect may be a part of a pattern if both depend on the posture, or both on time or load.
@@ -65,8 +82,18 @@ std::vector<Objection> judge_names(const Findings& found, const DiscoveryOptions
     return name.effect.smaller && name.effect.share < options.search.model_error &&
            may_be_an_error_of(found.larger, name.effect.effect);
   };
+  const Investigation& last = found.investigation;
+  const std::vector<StillJoint> still = still_joints(last.fitted.robot.chain, last.searched.poses);
+  const auto stands_still = [&](const Name& name) {
+    return std::ranges::find(still, name.effect.effect.at, &StillJoint::joint) != still.end();
+  };
+  const bool is_contradiction = has_both_signs(found.names);
   std::vector<Objection> objections = {against(Reason::undetermined, found.names, is_undetermined),
-                                       against(Reason::error_of_larger, found.names, is_error_of_larger)};
+                                       against(Reason::error_of_larger, found.names, is_error_of_larger),
+                                       against(Reason::still_joint, found.names, stands_still),
+                                       against(Reason::both_signs, found.names, [&](const Name& name) {
+                                         return is_contradiction && is_compliance(name);
+                                       })};
   if (found.is_beside_unknown()) objections.push_back(judge_parts(found));
   std::erase_if(objections, [](const Objection& one) { return one.names.empty(); });
   return objections;

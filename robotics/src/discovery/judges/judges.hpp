@@ -10,7 +10,9 @@ namespace llmt::robotics {
 
 /// Objections against single names:
 ///
-/// - undetermined: the fit of everything together puts all values within two standard errors of zero;
+/// - undetermined: the fit of everything together puts all values within two standard errors of zero, or holds them;
+/// - still_joint: the effect is one of a joint that stands still in the poses searched;
+/// - both_signs: compliances of one arm have both signs. A controller may count torques with either, but all with one;
 /// - error_of_larger: the effect was found beside larger ones, explains less than SearchOptions::model_error of what
 /// they
 ///   explain, and may be an error of theirs;

@@ -6,6 +6,7 @@
 ///     const double gain_mm = found.held_out.before.mean - found.held_out.after.mean;
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -49,6 +50,10 @@ struct FoundEffect {
   /// Standard error of the effect's constant, where that was fitted: the order of a wave, a presliding.
   std::optional<double> constant_error = {};
   bool smaller = false;  ///< found beside larger ones, in what they leave
+  /// Refits of everything that was found, each without a fifth of the poses; 0: none was made.
+  int refits = 0;
+  int held = 0;                               ///< those in which it is beyond two standard errors, of the same sign
+  std::vector<std::array<double, 2>> ranges;  ///< smallest and largest value of each parameter in them
 };
 
 struct FoundPattern {
