@@ -79,11 +79,18 @@ void calibrate_command(CalibrateArguments arguments) {
     print_json(report::calibration_json(run, arguments.output));
   } else {
     print(report::document_text(report::calibration_document(run), output_width()));
+    if (!run.acceptance.sentence.empty()) print(run.acceptance.sentence + "\n");
     if (!written.names.empty()) print(fmt::format("Written: {}\n", fmt::join(written.names, ", ")));
     print(written.beside_urdf);
     print(reports);
   }
+  using Verdict = report::Acceptance::Verdict;
+  if (!run.refusal.empty() && run.acceptance.verdict == Verdict::not_evaluated) {
+    throw report::NotEvaluated(run.refusal);
+  }
   if (!run.refusal.empty()) throw std::runtime_error(run.refusal);
+  if (run.acceptance.verdict == Verdict::not_evaluated) throw ExitCode{exit_not_evaluated};
+  if (run.acceptance.verdict == Verdict::fail) throw ExitCode{exit_refused};
 }
 
 }  // namespace
@@ -129,6 +136,9 @@ void add_calibrate(CLI::App& app) {
       ->add_option("--accept-suspicion", task.accept_suspicion,
                    "Take the files as they stand although they look like this mistake, by the name that was printed")
       ->type_name("NAME");
+  add_number(*command, "--limit-mm", task.limit_mm, above_zero,
+             "Largest mean error to be accepted, on the test file or else on poses left out: pass is exit code 0, fail "
+             "1, not evaluated 4");
   add_seed(*command, options.seed, "Of the random folds");
   add_threads(*command, options.max_threads);
   add_output_file(*command, "-o,--output", arguments->output,

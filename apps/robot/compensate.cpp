@@ -1,4 +1,5 @@
 #include <memory>
+#include <sstream>
 #include <stdexcept>
 
 #include "llmt/files.hpp"
@@ -51,7 +52,8 @@ void compensate_command(const CompensateArguments& arguments) {
     print_json(report::compensation_json(run, arguments.output));
   } else if (arguments.output.empty()) {
     print_bytes(csv);
-    warn(report::compensation_text(run, ""));
+    std::istringstream lines(report::compensation_text(run, ""));
+    for (std::string line; std::getline(lines, line);) warn(line);
   } else {
     print(report::compensation_text(run, arguments.output) + "\n");
   }
@@ -79,8 +81,9 @@ void add_compensate(CLI::App& app) {
       ->required();
   add_input_file(*command, "--nominal", arguments->nominal,
                  "Description that the controller goes by; it says where joint values are to bring the tool");
-  command->add_flag("--nominal-frames", arguments->nominal_frames,
-                    "Base and tool are those of --nominal (default: those of the robot, which were registered)");
+  command->add_flag(
+      "--nominal-frames", arguments->nominal_frames,
+      "Base and tool are those of --nominal (default: fitted, so that the nominal arm is nearest to the robot)");
   add_column_map(*command, arguments->columns);
   add_decimal_comma(*command, arguments->mark);
   command->add_option("--frame", arguments->frame, "Frame of target poses: world (of the instrument) or base")

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "llmt/files.hpp"
+#include "llmt/robotics/rigid_arm.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "shared/options.hpp"
 
@@ -47,7 +48,7 @@ SavedRobot save_corrected(robotics::CorrectedRobot robot, const std::string& pat
   if (urdf) {
     names.push_back(path);
     const robotics::IdentifiedUrdf identified =
-        robotics::to_urdf(read_file(source.path), source.path, source.links, robot.robot.chain);
+        robotics::to_urdf(read_file(source.path), source.path, source.links, robotics::geometry_alone(robot).chain);
     files.push_back({path, identified.text});
     saved.beside_urdf = beside_urdf(path, identified.has_tool);
   }

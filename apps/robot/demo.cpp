@@ -7,6 +7,7 @@
 
 #include "llmt/files.hpp"
 #include "llmt/robotics/calibration_report.hpp"
+#include "llmt/robotics/rigid_arm.hpp"
 #include "llmt/robotics/robot_check.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
@@ -52,13 +53,11 @@ std::string program_csv(robotics::Robot robot) {
   return text;
 }
 
-// How far the real arm ends from where the nominal one, in the frames that the model found, would be.
+// How far the real arm ends from where the nominal one would be, in the frames in which it is nearest to the model.
 robotics::ErrorFigures missed(const std::string& model, const std::string& commands) {
   const robotics::Robot real = robotics::read_robot("real_arm.yaml");
-  const robotics::Chain found = robotics::read_robot(model).chain;
   robotics::Robot nominal = robotics::read_robot("arm.yaml");
-  nominal.chain.base = found.base;
-  nominal.chain.tool = found.tool;
+  nominal.chain = robotics::with_fitted_frames(nominal.chain, robotics::read_corrected_robot(model));
   const Eigen::MatrixXd asked = robotics::positions(nominal, robotics::read_poses("program.csv", nominal));
   const Eigen::MatrixXd reached = robotics::positions(real, robotics::read_poses(commands, real));
   return robotics::error_figures((reached - asked).rowwise().norm());

@@ -16,6 +16,8 @@ robotics::Measurements predicted_table(const std::string& file, const robotics::
   Work work(progress);
   robotics::Measurements predicted;
   predicted.poses = robotics::with_needed_columns(robot.robot, robotics::with_approach(robot.robot, given), 1);
+  predicted.session = robot.robot.chain.session;
+  predicted.target = robot.robot.chain.target;
   name_made_up(given, predicted.poses, warn);
   const Eigen::Index count = predicted.poses.count();
   predicted.positions_mm.resize(count, 3);

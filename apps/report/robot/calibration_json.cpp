@@ -46,6 +46,7 @@ Json calibration_json(const CalibrationRun& run, const std::string& output) {
   json["folds"] = report.folds;
   json["contiguous"] = run.task.options.kind == FoldKind::contiguous;
   json["grouped_by_pose"] = report.grouped;
+  if (!robotics::sweeps_of(measurements.poses).empty()) json["sweeps"] = true;
   for (const JudgedModel& row : run.models) {
     Json entry;
     entry["in_sample_mm"] = figures_json(error_figures(row.stage.in_sample_mm));
@@ -63,6 +64,12 @@ Json calibration_json(const CalibrationRun& run, const std::string& output) {
   }
   json["correction_kept"] = report.corrected ? Json(report.correction_kept) : Json(nullptr);
   json["decision"] = report.decision;
+  if (run.acceptance.verdict != Acceptance::Verdict::not_asked) {
+    const bool is_evaluated = run.acceptance.verdict != Acceptance::Verdict::not_evaluated;
+    json["limit"] = {{"limit_mm", run.task.limit_mm},
+                     {"verdict", to_string(run.acceptance.verdict)},
+                     {"error_mm", is_evaluated ? Json(run.acceptance.error_mm) : Json(nullptr)}};
+  }
   json["termination"] = discovery::to_string(result.termination);
   json["iterations"] = result.iterations;
   if (report.calibration.began_without_priors) json["began_without_priors"] = true;

@@ -52,6 +52,59 @@ void require_poses_for_folds(const CalibrationRun& run) {
   }
 }
 
+const JudgedModel& model_to_use(const CalibrationRun& run) {
+  return run.report.correction_kept ? run.models.back() : run.models[1];
+}
+
+Acceptance acceptance_of(const CalibrationRun& run) {
+  Acceptance result;
+  const double limit = run.task.limit_mm;
+  if (!(limit > 0.0)) return result;
+  const JudgedModel& model = model_to_use(run);
+  const bool has_held_out = model.stage.held_out_mm.size() > 0;
+  if (run.is_implausible || !run.report.calibration.result.converged() || (!model.test && !has_held_out)) {
+    result.verdict = Acceptance::Verdict::not_evaluated;
+    result.sentence = model.test || has_held_out
+                          ? "NOT EVALUATED: the calibration is none, see below."
+                          : "NOT EVALUATED: no poses were left out of the fit, and there is no test file.";
+    return result;
+  }
+  result.error_mm = model.test ? model.test->mean : model.stage.held_out_mm.mean();
+  const bool passes = result.error_mm <= limit;
+  result.verdict = passes ? Acceptance::Verdict::pass : Acceptance::Verdict::fail;
+  result.sentence = fmt::format("{}: the mean error on {} is {:.4f} mm, the limit {:.4g} mm.", passes ? "PASS" : "FAIL",
+                                model.test ? "the test file" : "poses left out", result.error_mm, limit);
+  return result;
+}
+
+// Another session has another base and tool: the error is then metres, and no error of the arm.
+void refuse_another_session(const CalibrationRun& run) {
+  if (!run.test || run.task.new_session) return;
+  const JudgedModel& calibrated = run.models[1];
+  constexpr double far = 10.0;
+  constexpr double far_better = 0.1;
+  const double known = calibrated.stage.in_sample_mm.mean();
+  const double limit = std::max(far * known, 0.002 * robotics::size_of(run.nominal.chain, run.measurements));
+  if (!(calibrated.test->mean > limit) || robotics::measured_rows(*run.test).size() <= 9) return;
+  const JudgedModel fitted = judged_models(run.report, run.measurements, run.test, true)[1];
+  if (!(fitted.test->mean < far_better * calibrated.test->mean)) return;
+  throw std::runtime_error(fmt::format(
+      "{}: with base and tool of the calibration the mean error is {:.4g} mm, with a base and a tool of its own {:.4g} "
+      "mm: the file is of another session; {} fits them",
+      run.task.test_file, calibrated.test->mean, fitted.test->mean, run.task.face.switched("new-session")));
+}
+
+// The test file judges the correction, too.
+void judge_correction_by_test(CalibrationRun& run) {
+  if (!run.report.correction_kept || !run.test) return;
+  const double with = run.models.back().test->mean;
+  const double without = run.models[1].test->mean;
+  if (with <= without) return;
+  run.report.correction_kept = false;
+  run.report.decision = fmt::format(
+      "the correction is left out, it makes the test file worse: {:.4f} mm with it, {:.4f} mm without", with, without);
+}
+
 bool is_accepted(const CalibrationRun& run) {
   return !run.suspicion || run.suspicion->name == run.task.accept_suspicion;
 }
@@ -74,6 +127,20 @@ std::string refusal_of(const CalibrationRun& run) {
 
 }  // namespace
 
+std::string to_string(Acceptance::Verdict verdict) {
+  switch (verdict) {
+    case Acceptance::Verdict::not_asked:
+      return "";
+    case Acceptance::Verdict::pass:
+      return "pass";
+    case Acceptance::Verdict::fail:
+      return "fail";
+    case Acceptance::Verdict::not_evaluated:
+      return "not evaluated";
+  }
+  return "";
+}
+
 CalibrationRun run_calibration(const robotics::Robot& described, const robotics::Measurements& measured,
                                const ReadMeasurements& read_test, CalibrationTask task) {
   CalibrationRun run{.task = std::move(task),
@@ -89,6 +156,7 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
                      .learning = {},
                      .suspicion = {},
                      .is_implausible = false,
+                     .acceptance = {},
                      .refusal = {}};
   robotics::Measurements& measurements = run.measurements;
   if (measurements.count() == 0) {
@@ -108,6 +176,8 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
     measurements.warnings.push_back(std::move(*far));
   }
   run.models = judged_models(run.report, measurements, run.test, run.task.new_session);
+  refuse_another_session(run);
+  judge_correction_by_test(run);
   run.input_mistakes = robotics::input_mistakes(run.nominal, measurements, run.report);
   run.suspicion = robotics::likely_mistake(run.nominal, measurements);
   if (run.suspicion) {
@@ -128,6 +198,7 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
     const robotics::ReportOptions& options = run.task.options;
     run.learning = robotics::learning_curve(run.nominal, measurements, options.calibration, 3, options.seed);
   }
+  run.acceptance = acceptance_of(run);
   run.refusal = refusal_of(run);
   return run;
 }

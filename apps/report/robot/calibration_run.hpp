@@ -23,9 +23,21 @@ struct CalibrationTask {
   bool page = false;                  ///< with the learning curve
   bool new_session = false;           ///< base and tool are fitted to the test measurements
   std::string accept_suspicion = {};  ///< name of a suspicion that is none
+  double limit_mm = 0.0;              ///< largest mean error to be accepted; 0: nobody asked
   robotics::ReportOptions options = {};
   Face face = {};
 };
+
+/// The answer to the question whether the error is within the limit. By the test file, or else by poses left out.
+struct Acceptance {
+  enum class Verdict { not_asked, pass, fail, not_evaluated };
+  Verdict verdict = Verdict::not_asked;
+  double error_mm = 0.0;  ///< mean of the robot to use
+  std::string sentence;   ///< "PASS: the mean error on poses left out is 0.0330 mm, the limit 0.5 mm."
+};
+
+/// "pass", "fail", "not evaluated".
+std::string to_string(Acceptance::Verdict verdict);
 
 /// A calibration with all that its reports show.
 struct CalibrationRun {
@@ -42,6 +54,7 @@ struct CalibrationRun {
   std::vector<robotics::LearningPoint> learning;  ///< empty if nobody asked for it, or of few poses
   std::optional<robotics::Suspicion> suspicion;   ///< of a mistake in the files
   bool is_implausible = false;                    ///< the calibrated robot must not be used
+  Acceptance acceptance = {};                     ///< by the limit
   std::string refusal;                            ///< why the result is none, in a sentence; empty if it is one
 };
 

@@ -11,6 +11,7 @@
 
 #include "llmt/robotics/kinematics.hpp"
 #include "llmt/robotics/orientation.hpp"
+#include "llmt/robotics/rigid_arm.hpp"
 #include "llmt/robotics/simulation.hpp"
 
 namespace llmt::report {
@@ -19,6 +20,17 @@ namespace {
 using robotics::Compensation;
 using robotics::CorrectedRobot;
 using robotics::Outcome;
+
+// The robot as it stands in the session and with the target that the table names.
+CorrectedRobot in_frames(CorrectedRobot robot, const robotics::Observation& frames) {
+  robotics::Chain& chain = robot.robot.chain;
+  const auto frame_of = [](const std::vector<robotics::NamedFrame>& all, const std::string& name) {
+    return std::ranges::find(all, name, &robotics::NamedFrame::name)->frame;
+  };
+  if (!frames.base.empty()) chain.base = frame_of(chain.bases, frames.base);
+  if (!frames.tool.empty()) chain.tool = frame_of(chain.tools, frames.tool);
+  return robot;
+}
 
 // What the nominal description says of the asked-for joints, as the robot stands and with the tool that it carries.
 void take_nominal_poses(const CompensationTask& task, const CorrectedRobot& robot, robotics::Targets& targets) {
@@ -32,10 +44,7 @@ void take_nominal_poses(const CompensationTask& task, const CorrectedRobot& robo
     throw std::invalid_argument(fmt::format("--nominal: {} has {} joints, {} has {}", task.nominal_file,
                                             nominal.joints.size(), task.robot_file, robot.robot.chain.joints.size()));
   }
-  if (!task.nominal_frames) {
-    nominal.base = robot.robot.chain.base;
-    nominal.tool = robot.robot.chain.tool;
-  }
+  if (!task.nominal_frames) nominal = robotics::with_fitted_frames(std::move(nominal), robot);
   const robotics::Kinematics kinematics(nominal);
   targets.positions_mm.resize(targets.start.count(), 3);
   for (Eigen::Index row = 0; row < targets.start.count(); ++row) {
@@ -161,8 +170,9 @@ void warn_of_units(const std::string& file, const robotics::Chain& chain, const 
 
 }  // namespace
 
-CompensationRun run_compensation(const CorrectedRobot& robot, robotics::TargetTable table, CompensationTask task,
+CompensationRun run_compensation(const CorrectedRobot& given, robotics::TargetTable table, CompensationTask task,
                                  const Warn& warn) {
+  const CorrectedRobot robot = in_frames(given, table.frames);
   CompensationRun run{std::move(task), robot, std::move(table), {}, {}};
   warn_of_units(run.task.targets_file, robot.robot.chain, run.table, warn);
   Work work(run.task.progress);

@@ -34,9 +34,9 @@ struct CompensationRun {
   robotics::Compensation found;
 };
 
-/// Finds the commands. `robot`: see arm_alone(). Rows that are not as asked for, what was made up and what is not used
+/// Finds the commands. `given`: see arm_alone(). Rows that are not as asked for, what was made up and what is not used
 /// are named by `warn`. Throws as robotics::compensate(), and with the names of the files.
-CompensationRun run_compensation(const robotics::CorrectedRobot& robot, robotics::TargetTable table,
+CompensationRun run_compensation(const robotics::CorrectedRobot& given, robotics::TargetTable table,
                                  CompensationTask task, const Warn& warn);
 
 /// The commands under the names and in the units of the targets, with what became of each.

@@ -8,6 +8,7 @@
 #include "llmt/csv.hpp"
 #include "llmt/robotics/measurements.hpp"
 #include "measurements/header.hpp"
+#include "measurements/named_frames.hpp"
 #include "measurements/reference_rows.hpp"
 #include "measurements/sightings.hpp"
 
@@ -37,12 +38,6 @@ class FrameNames {
   std::string own_;
   bool own_is_unnamed_ = false;  // another name is then another frame
 };
-
-// Names of frames have no dots: their parameters are called base@NAME.x.
-std::string without_dots(std::string name) {
-  std::ranges::replace(name, '.', '_');
-  return name;
-}
 
 // Numbers of the stands of the arm. Rows of a column of targets with the same joint values, `pose` and session are one
 // stand; where times or an order are told, only if they follow each other.
@@ -181,7 +176,19 @@ PoseTable pose_table_of(const Csv& all, const Robot& robot, const ColumnMap& giv
   Poses poses{.joints = header.joints(), .covariates = header.covariates()};
   if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));
   add_moves(poses, robot.chain);
-  if (header.words("target").empty()) return {std::move(poses), header.joint_columns()};
+  poses.observations = known_frames(csv, robot.chain, header.words("session"), header.words("target"));
+  return {std::move(poses), header.joint_columns()};
+}
+
+// One row for each stand of the arm, whatever was looked at.
+Poses stands_in(const Csv& all, const Robot& robot, const ColumnMap& given) {
+  const ColumnMap map = for_columns_of(all, given);
+  const Csv csv = all.with_rows(reference_rows(all, map).others);
+  const Header header(csv, robot, {}, map);
+  Poses poses{.joints = header.joints(), .covariates = header.covariates()};
+  if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));
+  add_moves(poses, robot.chain);
+  if (header.words("target").empty()) return poses;
   // Several targets were looked at from one pose.
   const std::vector<Eigen::Index> stands = stands_of(poses, header.words("session"), true);
   std::vector<Eigen::Index> first;
@@ -189,7 +196,7 @@ PoseTable pose_table_of(const Csv& all, const Robot& robot, const ColumnMap& giv
   for (Eigen::Index row = 0; row < poses.count(); ++row) {
     if (known.insert(stands[row]).second) first.push_back(row);
   }
-  return {select(poses, first), header.joint_columns()};
+  return select(poses, first);
 }
 
 }  // namespace
@@ -214,7 +221,7 @@ PoseTable parse_pose_table(std::string text, const std::string& name, const Robo
 }
 
 Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& map) {
-  return read_pose_table(path, robot, mark, map).poses;
+  return stands_in(Csv::read(path, map.decimal.value_or(mark)), robot, map);
 }
 
 }  // namespace llmt::robotics

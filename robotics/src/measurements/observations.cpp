@@ -95,7 +95,39 @@ Robot with_frames(Robot robot, const Poses& poses) {
   return robot;
 }
 
+std::vector<double> sweeps_of(const Poses& poses) {
+  constexpr double standing = 1e-3;  // of the joint's range
+  constexpr double most_steps = 0.5;
+  constexpr double fewest_sweeps = 5.0;
+  const Eigen::MatrixXd& joints = poses.joints;
+  const Eigen::Index n = joints.rows();
+  if (n < 2) return {};
+  const Eigen::RowVectorXd least = standing * (joints.colwise().maxCoeff() - joints.colwise().minCoeff());
+  std::vector<double> labels(n, 0.0);
+  double sweep = 0.0;
+  double in_sweeps = 0.0;
+  double steps = 0.0;
+  Eigen::Index swept = -1;  // the joint of this sweep
+  for (Eigen::Index i = 1; i < n; ++i) {
+    const Eigen::ArrayXd by = (joints.row(i) - joints.row(i - 1)).cwiseAbs().transpose();
+    const auto moves = by > least.transpose().array();
+    const Eigen::Index moving = moves.count();
+    if (moving > 0) steps += 1.0;
+    Eigen::Index joint = swept;
+    if (moving == 1) by.maxCoeff(&joint);
+    for (Eigen::Index j = 0; j < by.size() && moving == 1; ++j) joint = moves(j) ? j : joint;
+    const bool goes_on = moving == 0 || (moving == 1 && (swept < 0 || joint == swept));
+    if (moving == 1) in_sweeps += 1.0;
+    if (!goes_on) sweep += 1.0;
+    swept = moving == 0 ? swept : moving == 1 ? joint : -1;
+    labels[i] = sweep;
+  }
+  const bool are_sweeps = in_sweeps >= most_steps * steps && steps > 0.0 && sweep + 1.0 >= fewest_sweeps;
+  return are_sweeps ? labels : std::vector<double>{};
+}
+
 std::vector<double> pose_labels(const Poses& poses) {
+  if (std::vector<double> sweeps = sweeps_of(poses); !sweeps.empty()) return sweeps;
   const auto pose = poses.covariates.find("pose");
   if (pose != poses.covariates.end()) return {pose->second.begin(), pose->second.end()};
   std::vector<double> labels;

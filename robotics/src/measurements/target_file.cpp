@@ -8,6 +8,7 @@
 #include "llmt/csv.hpp"
 #include "llmt/robotics/measurements.hpp"
 #include "measurements/header.hpp"
+#include "measurements/named_frames.hpp"
 
 namespace llmt::robotics {
 
@@ -47,6 +48,14 @@ TargetTable targets_of(const Csv& csv, const Robot& robot, const ColumnMap& give
     if (target.empty()) continue;
     throw std::runtime_error(
         fmt::format("{}:1: column {}x_mm: a target of the tool itself is x_mm, y_mm, z_mm", csv.name(), target));
+  }
+  const std::vector<Observation> frames =
+      known_frames(csv, robot.chain, header.words("session"), header.words("target"));
+  for (std::size_t row = 0; row < frames.size(); ++row) {
+    if (row == 0) targets.frames = frames.front();
+    if (frames[row].base == targets.frames.base && frames[row].tool == targets.frames.tool) continue;
+    csv.refuse(static_cast<Eigen::Index>(row), header.words("session").empty() ? "target" : "session",
+               "all targets of a file belong to one session and one target: write a file for each");
   }
   for (const char* column : {"target", "session", "reference", "distance", "socket", "plane", "sphere", "radius"}) {
     if (!header.words(column).empty() || header.has(column)) targets.unused_columns.emplace_back(column);

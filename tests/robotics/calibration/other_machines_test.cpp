@@ -108,6 +108,40 @@ TEST(OtherMachines, ATurntableHasTheSizeOfItsPoints) {
   EXPECT_TRUE(is_implausible(turntable(), degrees, report_calibration(turntable(), degrees)));
 }
 
+// The way of an axis, joint after joint, all others at home.
+Poses sweeps(const Chain& chain, Eigen::Index each) {
+  Poses poses;
+  const auto joints = std::ssize(chain.joints);
+  poses.joints = Eigen::MatrixXd::Constant(joints * each, joints, 0.3);
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    for (Eigen::Index k = 0; k < each; ++k) {
+      poses.joints(j * each + k, j) = -1.2 + 2.4 * static_cast<double>(k) / static_cast<double>(each - 1);
+    }
+  }
+  return poses;
+}
+
+TEST(Sweeps, AreFoundAndHeldOutWhole) {
+  const Robot robot = ur_like();
+  const std::vector<double> labels = sweeps_of(sweeps(robot.chain, 12));
+  ASSERT_EQ(labels.size(), 72U);
+  EXPECT_LE(labels.back(), 11.0);
+  for (Eigen::Index j = 0; j < 6; ++j) {
+    for (Eigen::Index k = 2; k < 12; ++k) EXPECT_EQ(labels[j * 12 + k], labels[j * 12 + 1]) << j << " " << k;
+    if (j > 0) {
+      EXPECT_NE(labels[j * 12 + 5], labels[j * 12 - 5]);
+    }
+  }
+  EXPECT_TRUE(sweeps_of(random_poses(robot.chain, 60, 1)).empty());
+  // Sweeps of single joints tell little of other poses. Rows left out at random would not show it.
+  Robot coupled = perturbed(robot, 0.3, 0.05, 5);
+  Poses seen = sweeps(robot.chain, 12);
+  Measurements measured = measure(coupled, seen, 0.02, 6);
+  measured.poses.joints.col(2) += measured.poses.joints.col(1);
+  const CalibrationReport report = report_calibration(robot, measured);
+  EXPECT_GT(report.geometric.held_out_mm.mean(), 20.0 * report.geometric.in_sample_mm.mean());
+}
+
 // A X = Y B: the target on the flange and the robot in front of the camera, from flange poses alone.
 TEST(OtherMachines, AFlangePoseGivesHandAndEye) {
   const std::string text = read_file(LLMT_SAMPLES_DIR "/flange.urdf");

@@ -140,7 +140,7 @@ Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, cons
           return is_unproven(found) || beyond.contains(found.term) || narrow.contains(found.term) ||
                  chance.contains(found.term);
         });
-    if (holds || (trial >= most && beyond.empty() && narrow.empty() && chance.empty())) {
+    if (holds || (trial >= most && beyond.empty() && narrow.empty())) {
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
       return missing;
     }

@@ -75,8 +75,12 @@ Robot with_frames(Robot robot, const Measurements& measurements);
 std::vector<Eigen::Index> orientation_rows(const Poses& poses);
 std::vector<Eigen::Index> position_rows(const Poses& poses);
 
-/// One number per row, equal where rows belong to one pose and must not be torn apart: the column `pose`, or else
-/// Observation::stand. Empty: every row is a pose of its own.
+/// Numbers of sweeps, one per row, where most steps from row to row move one joint alone: rows that follow each other
+/// while the same joint moves. Empty: the poses are no sweeps, or fewer than five.
+std::vector<double> sweeps_of(const Poses& poses);
+
+/// One number per row, equal where rows belong together and must not be torn apart: sweeps_of(), the column `pose`, or
+/// else Observation::stand. Empty: every row is a pose of its own.
 std::vector<double> pose_labels(const Poses& poses);
 
 /// The mean of readings of one kind and one tool; of orientations relative to the reference of the first row.
@@ -170,10 +174,12 @@ struct PoseTable {
   std::vector<JointColumn> joint_columns;
 };
 
-/// The joint values and covariates of such a file, which may have no measured positions. Columns of the map that the
-/// file lacks do not matter.
+/// The joint values and covariates of such a file, which may have no measured positions: one row for each stand of the
+/// arm. Columns of the map that the file lacks do not matter.
 Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point,
                  const ColumnMap& map = {});
+/// Every row, with the frames of its session and target where the robot has these by name. Throws std::runtime_error,
+/// naming the line, for one that it does not have.
 PoseTable read_pose_table(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point,
                           const ColumnMap& map = {});
 
@@ -190,12 +196,14 @@ struct TargetTable {
   std::map<std::string, Eigen::VectorXd> covariates;
   std::vector<std::string> unused_columns;
   std::vector<Eigen::Index> lines;  ///< of the file, for messages
+  Observation frames = {};          ///< base and tool of the session and target that all rows name
 
   Eigen::Index count() const { return std::ssize(lines); }
 };
 
 /// Reads targets: columns as for read_measurements(), but either joints or positions may be absent; positions need all
-/// of x, y and z. Columns of the map that the file lacks do not matter. Throws as read_measurements().
+/// of x, y and z. Columns of the map that the file lacks do not matter. Sessions and targets that the robot has by name
+/// must be the same in all rows. Throws as read_measurements().
 TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point,
                          const ColumnMap& map = {});
 

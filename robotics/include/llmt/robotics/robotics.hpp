@@ -35,6 +35,7 @@
 #include "llmt/robotics/pose_selection_options.hpp"
 #include "llmt/robotics/robot.hpp"
 #include "llmt/robotics/robot_c_source.hpp"
+#include "llmt/robotics/rigid_arm.hpp"
 #include "llmt/robotics/robot_check.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/robot_types.hpp"
