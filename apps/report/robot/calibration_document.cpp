@@ -66,10 +66,8 @@ std::vector<std::string> error_sentences(const CalibrationRun& run) {
         fmt::format("held-out: on poses that were left out of the fit{}. in-sample: on the poses that were fitted.",
                     kept_length(report).empty() ? "; take these for the error at new poses" : ""));
   }
-  if (report.folds > 0 && !robotics::sweeps_of(run.measurements.poses).empty()) {
-    lines.push_back(
-        "The poses move one joint at a time: whole sweeps are held out, for the poses of a sweep tell of each other.");
-  }
+  const bool are_sweeps = report.folds > 0 && !robotics::sweeps_of(run.measurements.poses).empty();
+  if (are_sweeps) lines.emplace_back("The poses move one joint at a time: whole sweeps are held out.");
   if (report.correction) {
     std::vector<std::string> leaves;
     for (const PartitionSummary& partition : report.correction->summary.partitions) {

@@ -11,9 +11,9 @@
 #include "calibration/free_parameters.hpp"
 #include "calibration/joint_map_shift.hpp"
 #include "calibration/joint_ranges.hpp"
-#include "calibration/machine_size.hpp"
 #include "calibration/noise_model.hpp"
 #include "calibration/still_joints.hpp"
+#include "calibration/travel.hpp"
 #include "linear_algebra/linear_algebra.hpp"
 #include "llmt/robotics/calibration_problem.hpp"
 

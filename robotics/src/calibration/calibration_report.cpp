@@ -8,6 +8,7 @@
 
 #include "calibration/input_mistakes.hpp"
 #include "calibration/suspected_changes.hpp"
+#include "calibration/travel.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
@@ -136,6 +137,13 @@ CorrectedRobot CalibrationReport::best() const {
   CorrectedRobot robot{.robot = calibration.robot, .correction = {}};
   if (correction_kept) robot.correction = correction->model;
   return robot;
+}
+
+double size_of(const Chain& chain, const Measurements& measurements) {
+  const double size = reach_of(chain) - chain.tool.xyz_mm.norm() + travel_of(chain, measurements.poses);
+  if (size > 0.0 || measurements.count() == 0) return size;
+  const Eigen::MatrixXd& points = measurements.positions_mm;
+  return std::sqrt((points.rowwise() - points.colwise().mean()).squaredNorm() / static_cast<double>(points.rows()));
 }
 
 bool is_implausible(const Robot& nominal, const Measurements& measurements, const CalibrationReport& report) {

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "calibration/machine_size.hpp"
+#include "calibration/travel.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/robotics/calibration.hpp"
 

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "calibration/joint_map_shift.hpp"
-#include "calibration/machine_size.hpp"
 #include "calibration/still_joints.hpp"
+#include "calibration/travel.hpp"
 #include "discovery/gap_map.hpp"
 #include "discovery/input_mistakes.hpp"
 #include "discovery/investigation/constant_fit.hpp"
@@ -291,7 +291,7 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
   const std::optional<PairedDifference> gain = held_out_gain(robots, split);
   const Refits refits = robots.is_worse ? Refits{} : refits_of(robots, split, found, options);
   if (const std::optional<Objection> fails = judge_refits(refits)) objections.push_back(*fails);
-  const std::optional<Objection> loss = judge_held_out_loss(refits.gain ? refits.gain : gain, found.names.size());
+  const std::optional<Objection> loss = judge_held_out_loss(gain, found.names.size());
   const bool is_withdrawn = robots.is_worse || loss;
   if (loss) {
     objections.push_back(*loss);

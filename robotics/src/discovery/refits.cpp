@@ -61,31 +61,13 @@ Refits refits_of(const Robots& robots, const PoseSplit& split, const Findings& f
   if (!is_changed || kept.count() < 2 * folds) return refits;
   const std::vector<Eigen::Index> repeats = repeats_of(kept.poses);
   const std::vector<double> labels(repeats.begin(), repeats.end());
-  std::vector<double> before;
-  std::vector<double> after;
-  const auto judge_by = [&](const Robot& was, const Robot& now, const Measurements& readings) {
-    const Eigen::VectorXd old_errors = distances(positions(was, readings.poses), readings);
-    const Eigen::VectorXd new_errors = distances(positions(now, readings.poses), readings);
-    before.insert(before.end(), old_errors.begin(), old_errors.end());
-    after.insert(after.end(), new_errors.begin(), new_errors.end());
-  };
   refits.names.resize(found.names.size());
   for (const Fold& fold : make_folds(kept.count(), {.count = folds, .seed = options.seed}, labels)) {
     const Measurements fitted_to = without_rows(kept, rows_without(kept.count(), fold.train));
-    const Measurements left_out = without_rows(kept, rows_without(kept.count(), fold.held_out));
     const Calibration now = calibrate(robots.improved.robot, fitted_to, options.calibration);
-    judge_by(calibrate(robots.before, fitted_to, options.calibration).robot, now.robot, left_out);
     for (std::size_t k = 0; k < found.names.size(); ++k) add(found.names[k], now, refits.names[k]);
     ++refits.count;
   }
-  if (robots.improved.correction) return refits;
-  if (split.test.count() > 0 && split.test.measured == split.searched.measured) {
-    judge_by(robots.before, robots.improved.robot, split.test);
-  }
-  const auto as_vector = [](const std::vector<double>& all) {
-    return Eigen::VectorXd(Eigen::VectorXd::Map(all.data(), std::ssize(all)));
-  };
-  refits.gain = paired_difference(as_vector(before), as_vector(after));
   return refits;
 }
 

@@ -16,14 +16,12 @@ struct NameInRefits {
 };
 
 struct Refits {
-  int count = 0;                         ///< 0: nothing was fitted again
-  std::vector<NameInRefits> names;       ///< as Findings::names
-  std::optional<PairedDifference> gain;  ///< of the readings left out, by the robot fitted without them
+  int count = 0;                    ///< 0: nothing was fitted again
+  std::vector<NameInRefits> names;  ///< as Findings::names
 };
 
-/// Five refits of the robots before and with what was found, each without a fifth of the samples (repeats of a pose
-/// together) and the outliers. The gain counts the readings left out and, by the robots of all samples, those that were
-/// set aside; it is nothing where a correction by trees is part of the robot. None is made where nothing was found.
+/// Five refits of the robot with what was found, each without a fifth of the samples (repeats of a pose together) and
+/// the outliers. None is made where nothing was found.
 Refits refits_of(const Robots& robots, const PoseSplit& split, const Findings& found, const DiscoveryOptions& options);
 
 /// Objection to names that do not hold in four of five refits.

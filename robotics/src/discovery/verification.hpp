@@ -34,7 +34,7 @@ Robots withdrawn(Robots robots);
 /// nothing was found that could be written.
 std::optional<PairedDifference> held_out_gain(const Robots& robots, const PoseSplit& split);
 
-/// Objection to all names if the mean of the gain, of readings that took no part, is not above 0. A gain within two
+/// Objection to all names if the mean of the gain is not above 0. A gain within two
 /// standard errors is no objection: the poses searched speak for the names, and those set aside do not speak against
 /// them.
 std::optional<Objection> judge_held_out_loss(const std::optional<PairedDifference>& gain, std::size_t names);

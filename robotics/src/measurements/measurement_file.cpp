@@ -169,26 +169,19 @@ Measurements from_csv(const Csv& all, const Robot& robot, const std::vector<std:
   return measurements;
 }
 
-PoseTable pose_table_of(const Csv& all, const Robot& robot, const ColumnMap& given) {
+// `with_frames`: of sessions and targets that the robot has by name. Without them there is one row for each stand of
+// the arm, whatever was looked at.
+PoseTable pose_table_of(const Csv& all, const Robot& robot, const ColumnMap& given, bool with_frames) {
   const ColumnMap map = for_columns_of(all, given);
   const Csv csv = all.with_rows(reference_rows(all, map).others);
   const Header header(csv, robot, {}, map);
   Poses poses{.joints = header.joints(), .covariates = header.covariates()};
   if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));
   add_moves(poses, robot.chain);
-  poses.observations = known_frames(csv, robot.chain, header.words("session"), header.words("target"));
-  return {std::move(poses), header.joint_columns()};
-}
-
-// One row for each stand of the arm, whatever was looked at.
-Poses stands_in(const Csv& all, const Robot& robot, const ColumnMap& given) {
-  const ColumnMap map = for_columns_of(all, given);
-  const Csv csv = all.with_rows(reference_rows(all, map).others);
-  const Header header(csv, robot, {}, map);
-  Poses poses{.joints = header.joints(), .covariates = header.covariates()};
-  if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));
-  add_moves(poses, robot.chain);
-  if (header.words("target").empty()) return poses;
+  if (with_frames) {
+    poses.observations = known_frames(csv, robot.chain, header.words("session"), header.words("target"));
+  }
+  if (header.words("target").empty() || !poses.observations.empty()) return {std::move(poses), header.joint_columns()};
   // Several targets were looked at from one pose.
   const std::vector<Eigen::Index> stands = stands_of(poses, header.words("session"), true);
   std::vector<Eigen::Index> first;
@@ -196,7 +189,7 @@ Poses stands_in(const Csv& all, const Robot& robot, const ColumnMap& given) {
   for (Eigen::Index row = 0; row < poses.count(); ++row) {
     if (known.insert(stands[row]).second) first.push_back(row);
   }
-  return select(poses, first);
+  return {select(poses, first), header.joint_columns()};
 }
 
 }  // namespace
@@ -212,16 +205,16 @@ Measurements parse_measurements(std::string text, const std::string& name, const
 }
 
 PoseTable read_pose_table(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& map) {
-  return pose_table_of(Csv::read(path, map.decimal.value_or(mark)), robot, map);
+  return pose_table_of(Csv::read(path, map.decimal.value_or(mark)), robot, map, true);
 }
 
 PoseTable parse_pose_table(std::string text, const std::string& name, const Robot& robot, DecimalMark mark,
                            const ColumnMap& map) {
-  return pose_table_of(Csv::parse(std::move(text), name, map.decimal.value_or(mark)), robot, map);
+  return pose_table_of(Csv::parse(std::move(text), name, map.decimal.value_or(mark)), robot, map, true);
 }
 
 Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& map) {
-  return stands_in(Csv::read(path, map.decimal.value_or(mark)), robot, map);
+  return pose_table_of(Csv::read(path, map.decimal.value_or(mark)), robot, map, false).poses;
 }
 
 }  // namespace llmt::robotics

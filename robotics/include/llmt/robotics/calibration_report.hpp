@@ -29,8 +29,8 @@ struct ErrorFigures {
 /// Figures of n distances. Throws std::invalid_argument if n is 0.
 ErrorFigures error_figures(const Eigen::VectorXd& distances_mm);
 
-/// Keeps the mean of errors on poses left out, mm, and their standard deviation (over n - 1), for a later check. Readings
-/// that lie far off (as for far_readings()) do not count.
+/// Keeps the mean of errors on poses left out, mm, and their standard deviation (over n - 1), for a later check.
+/// Readings that lie far off (as for far_readings()) do not count.
 void remember_errors(CalibrationRecord& record, const Eigen::VectorXd& left_out_mm);
 
 struct ReportOptions {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "calibration/free_parameters.hpp"
-#include "calibration/machine_size.hpp"
+#include "calibration/travel.hpp"
 #include "discovery/investigation/jacobian_range.hpp"
 #include "discovery/investigation/pose_split.hpp"
 #include "linear_algebra/linear_algebra.hpp"

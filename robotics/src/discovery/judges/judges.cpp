@@ -26,10 +26,11 @@ bool is_known(const FoundParameter& one) { return one.value != 0.0 && std::abs(o
 
 bool is_undetermined(const Name& name) { return std::ranges::none_of(name.effect.parameters, is_known); }
 
-// Compliances of gears and controllers. A controller may count torques with either sign, but all with one.
+// Compliances, by their unit, of gears and controllers. A controller may count torques with either sign, but all with
+// one.
 bool is_compliance(const Name& name) {
-  const std::string& type = name.effect.effect.type;
-  return effect_type(type).family == "joint_compliance" && name.effect.parameters.size() == 1;
+  const std::vector<FoundParameter>& values = name.effect.parameters;
+  return values.size() == 1 && values.front().unit.starts_with("rad/(N");
 }
 
 bool has_both_signs(const std::vector<Name>& names) {
