@@ -9,7 +9,7 @@
 
 #include "apps/programs.hpp"
 
-namespace {
+namespace sessions {
 
 using program::Folder;
 using program::Outcome;
@@ -40,9 +40,9 @@ void write_arms(const Folder& folder) {
   folder.write("moved.yaml", text.replace(base, text.find(']', base) - base, "xyz_mm: [900, -2500, 300"));
 }
 
-void simulate(const Folder& folder, const std::string& arm, int poses, int seed, const std::string& to) {
-  const Outcome run = folder.run(
-      fmt::format("{} simulate {} --poses {} --noise-um 20 --seed {} -o {}", robot_program, arm, poses, seed, to));
+void simulate(const Folder& folder, const std::string& description, int poses, int seed, const std::string& to) {
+  const Outcome run = folder.run(fmt::format("{} simulate {} --poses {} --noise-um 20 --seed {} -o {}", robot_program,
+                                             description, poses, seed, to));
   ASSERT_EQ(run.exit_code, 0) << run.err;
 }
 
@@ -119,8 +119,8 @@ TEST(SessionsProgram, ALimitIsPassedFailedOrNotEvaluated) {
   EXPECT_EQ(fail.exit_code, 1);
   EXPECT_NE(fail.out.find("FAIL: "), std::string::npos) << fail.out;
   EXPECT_EQ(run("--limit-mm 0.5 --folds 0").exit_code, 4);
-  const Outcome json = run("--limit-mm 0.001 --json");
-  EXPECT_EQ(nlohmann::json::parse(json.out)["limit"]["verdict"], "fail");
+  const Outcome as_json = run("--limit-mm 0.001 --json");
+  EXPECT_EQ(nlohmann::json::parse(as_json.out)["limit"]["verdict"], "fail");
   EXPECT_EQ(run("--limit-mm -1").exit_code, 2);
 }
 
@@ -144,4 +144,4 @@ TEST(SessionsProgram, CompensateSummaryHasLinesAndTheFramesOfTheNominalArm) {
   EXPECT_NEAR(summary["mean_before_mm"].get<double>(), nominal, 0.2 * nominal);
 }
 
-}  // namespace
+}  // namespace sessions

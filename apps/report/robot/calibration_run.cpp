@@ -101,6 +101,9 @@ void judge_correction_by_test(CalibrationRun& run) {
   const double without = run.models[1].test->mean;
   if (with <= without) return;
   run.report.correction_kept = false;
+  if (run.report.folds > 0) {
+    robotics::remember_errors(*run.report.calibration.robot.calibration, run.report.geometric.held_out_mm);
+  }
   run.report.decision = fmt::format(
       "the correction is left out, it makes the test file worse: {:.4f} mm with it, {:.4f} mm without", with, without);
 }

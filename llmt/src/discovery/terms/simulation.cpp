@@ -109,9 +109,6 @@ Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const Measur
   constexpr double described = 0.9;
   if (surrogate.described().minCoeff() >= described) {
     deviations += as_measured(inputs, surrogate.jumps(inputs.values));
-  } else {
-    deviations.conservativeResize(Eigen::NoChange, 2 * measured.values.cols());
-    deviations.rightCols(measured.values.cols()) = measured.values;
   }
   inputs.zero_bands = zero_bands(inputs, deviations);
   if (!(inputs.zero_bands.array() > 0.0).any()) inputs.zero_bands.resize(0);
