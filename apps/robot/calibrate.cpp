@@ -15,6 +15,7 @@
 #include "robot/commands.hpp"
 #include "robot/corrected_file.hpp"
 #include "robot/measured_file.hpp"
+#include "robot/provenance.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 #include "shared/report_files.hpp"
@@ -30,6 +31,7 @@ struct CalibrateArguments {
   std::vector<std::string> priors;
   MeasuredFileOptions reading;
   report::CalibrationTask task;
+  Stated stated;
   ReportFiles reports;
 };
 
@@ -50,7 +52,7 @@ std::map<std::string, double> priors_of(const std::vector<std::string>& texts) {
   return priors;
 }
 
-void calibrate_command(CalibrateArguments arguments) {
+void calibrate_command(const CLI::App& command, CalibrateArguments arguments) {
   report::CalibrationTask& task = arguments.task;
   task.page = arguments.reports.wanted();
   robotics::ReportOptions& options = task.options;
@@ -66,9 +68,16 @@ void calibrate_command(CalibrateArguments arguments) {
   }
   ProgressBar bar("calibrating");
   options.progress = bar.callback();
-  const report::CalibrationRun run = report::run_calibration(
+  report::CalibrationRun run = report::run_calibration(
       described, read_measured(task.data_file, described, {}, arguments.reading), read_test, task);
   bar.clear();
+  run.report.calibration.robot.calibration->made_from =
+      provenance_of(command,
+                    {{"description", task.robot_file},
+                     {"measurements", task.data_file},
+                     {"test", task.test_file},
+                     {"column map", arguments.reading.columns}},
+                    arguments.stated);
   SavedRobot written;
   if (!arguments.output.empty() && !run.is_implausible) {
     written = save_corrected(run.report.best(), arguments.output, {task.robot_file, arguments.links});
@@ -139,6 +148,7 @@ void add_calibrate(CLI::App& app) {
   add_number(*command, "--limit-mm", task.limit_mm, above_zero,
              "Largest mean error to be accepted, on the test file or else on poses left out: pass is exit code 0, fail "
              "1, not evaluated 4");
+  add_stated(*command, arguments->stated);
   add_seed(*command, options.seed, "Of the random folds");
   add_threads(*command, options.max_threads);
   add_output_file(*command, "-o,--output", arguments->output,
@@ -149,7 +159,7 @@ void add_calibrate(CLI::App& app) {
   command->add_flag("--json", arguments->json, "Print the report as JSON");
   command->callback([command, arguments] {
     check_beside_urdf(*command, arguments->output);
-    calibrate_command(*arguments);
+    calibrate_command(*command, *arguments);
   });
 }
 

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/robot_file.hpp"
@@ -12,6 +13,7 @@
 #include "robot/commands.hpp"
 #include "robot/corrected_file.hpp"
 #include "robot/measured_file.hpp"
+#include "robot/provenance.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 #include "shared/report_files.hpp"
@@ -29,10 +31,11 @@ struct DiscoverArguments {
   bool json = false;
   MeasuredFileOptions reading;
   report::DiscoveryTask task;
+  Stated stated;
   ReportFiles reports;
 };
 
-void discover_command(DiscoverArguments arguments) {
+void discover_command(const CLI::App& command, DiscoverArguments arguments) {
   const robotics::Robot described = read_description(arguments.robot, arguments.data, arguments.links);
   refuse_lost_correction(described, arguments.robot, arguments.output);
   robotics::DiscoveryOptions& options = arguments.task.options;
@@ -48,12 +51,21 @@ void discover_command(DiscoverArguments arguments) {
   ProgressBar bar("discover");
   options.progress = bar.callback();
   arguments.task.robot_file = arguments.robot;
-  const report::DiscoveryRun run =
+  report::DiscoveryRun run =
       report::run_discovery(described, data, read_test, arguments.task, [&](const Finding& finding) {
         bar.clear();
         warn_of(finding);
       });
   bar.clear();
+  if (std::optional<robotics::CalibrationRecord>& record = run.found.improved.robot.calibration) {
+    record->made_from = provenance_of(command,
+                                      {{"description", arguments.robot},
+                                       {"measurements", arguments.data},
+                                       {"test", arguments.test},
+                                       {"catalogue", arguments.catalogue},
+                                       {"column map", arguments.reading.columns}},
+                                      arguments.stated);
+  }
   SavedRobot written;
   if (!arguments.output.empty()) {
     written = save_corrected(run.found.improved, arguments.output, {arguments.robot, arguments.links});
@@ -108,12 +120,13 @@ void add_discover(CLI::App& app) {
       ->add_option("--accept-suspicion", arguments->task.accept_suspicion,
                    "Take the files as they stand although they look like this mistake, by the name that was printed")
       ->type_name("NAME");
+  add_stated(*command, arguments->stated);
   add_seed(*command, arguments->task.options.seed, "Of the poses set aside");
   add_report_options(*command, arguments->reports, "the error before and after");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback([command, arguments] {
     check_beside_urdf(*command, arguments->output);
-    discover_command(*arguments);
+    discover_command(*command, *arguments);
   });
 }
 

@@ -3,14 +3,14 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "llmt/files.hpp"
-#include "llmt/robotics/rigid_arm.hpp"
 #include "llmt/robotics/robot_c_source.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "report/robot/controller_tables.hpp"
-#include "report/robot/measurement_text.hpp"
 #include "robot/commands.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
@@ -22,6 +22,8 @@ struct ExportArguments {
   std::string robot;
   robotics::UrdfLinks links;
   std::string deltas_from;
+  std::string session;
+  std::string target;
   std::string output;
   std::string name = "robot";
   bool kinematics = false;
@@ -45,35 +47,15 @@ void export_c(const ExportArguments& arguments) {
   const std::string header = beside(arguments.output, ".h").string();
   if (header == arguments.output) throw std::invalid_argument("--output: the header has this name; write to FILE.c");
   refuse_lost_input(header, arguments.robot);
-  const robotics::CorrectedRobot robot = read_arm(arguments.robot, arguments.links);
+  robotics::CorrectedRobot robot = read_arm(arguments.robot, arguments.links);
+  robot.robot.chain = robotics::in_session(std::move(robot.robot.chain), arguments.session, arguments.target);
   const CSource c = source_of(robot, arguments, std::filesystem::path(header).filename().string());
   const std::vector<NewFile> files = {{arguments.output, c.source}, {header, c.header}};
   write_files(files);
-  print(fmt::format("{}: {} joints, {} effects, {} correction; conditions: {}; written to {} and {}\n",
+  print(fmt::format("{}: {} joints, {} effects, {} correction; conditions: {}; positions {}; written to {} and {}\n",
                     robot.robot.chain.name, robot.robot.chain.joints.size(), robot.robot.effects.size(),
                     robot.correction ? "with a" : "no", fmt::join(robotics::c_conditions(robot.robot), ", "),
-                    arguments.output, header));
-}
-
-// Frames and the zeros of the joints: what a controller takes that knows mastering offsets alone.
-std::vector<std::string> zeros_of(const robotics::Chain& chain) {
-  std::vector<std::string> names = {"base", "tool"};
-  for (const robotics::Joint& joint : chain.joints) {
-    if (joint.mimic) continue;
-    names.push_back(joint.name + (joint.type == robotics::JointType::revolute ? ".theta" : ".d"));
-  }
-  return names;
-}
-
-// How far the tool is off by what the table does not hold.
-std::string loss_of(const robotics::CorrectedRobot& whole, const robotics::Robot& alone, bool zeros) {
-  const robotics::Measurements seen = robotics::points_of_model(whole);
-  const double mean = robotics::distances(robotics::positions(alone, seen.poses), seen).mean();
-  return fmt::format(
-      "The table holds {} alone, fitted anew to the whole model over the calibrated joint ranges, because values "
-      "identified beside {} belong together. Without the rest the tool is {:.4f} mm off on average; llmt-robot "
-      "compensate has all",
-      zeros ? "the zeros of the joints" : "the geometry", zeros ? "the others" : "effects and correction", mean);
+                    report::frames_text(robot.robot.chain), arguments.output, header));
 }
 
 void export_command(const ExportArguments& arguments) {
@@ -84,27 +66,20 @@ void export_command(const ExportArguments& arguments) {
     export_c(arguments);
     return;
   }
-  const robotics::CorrectedRobot whole =
+  robotics::CorrectedRobot whole =
       robotics::read_corrected_robot(arguments.robot, links_for(arguments.robot, arguments.links, {}));
-  robotics::Robot robot = robotics::geometry_alone(whole);
-  std::string text;
-  if (arguments.kinematics) {
-    text = report::kinematics_yaml(robot.chain);
-  } else {
+  whole.robot.chain = robotics::in_session(std::move(whole.robot.chain), arguments.session, arguments.target);
+  std::optional<robotics::Chain> nominal;
+  if (!arguments.deltas_from.empty()) {
     const robotics::UrdfLinks links = links_for(arguments.deltas_from, arguments.links, whole.robot);
-    const robotics::Chain nominal = robotics::read_robot(arguments.deltas_from, links).chain;
-    if (arguments.zeros) robot.chain = robotics::fitted_to_model(nominal, whole, zeros_of(nominal));
-    text = report::deltas_csv(robot.chain, nominal);
+    nominal = robotics::read_robot(arguments.deltas_from, links).chain;
   }
+  const std::string text =
+      report::geometry_table(whole, nominal ? &*nominal : nullptr, arguments.zeros, warn_of);
   if (arguments.output.empty()) {
     print_bytes(text);
   } else {
     write_file(arguments.output, text);
-  }
-  const bool is_alone = !whole.robot.effects.empty() || whole.correction.has_value();
-  if (is_alone || arguments.zeros) warn(loss_of(whole, robot, arguments.zeros));
-  if (const std::string uncertain = report::uncertain_text(robot); !uncertain.empty()) {
-    warn_of(report::uncertain_values_warning(uncertain));
   }
 }
 
@@ -128,6 +103,10 @@ void add_robot_export(CLI::App& app) {
       ->add_flag("--zeros", arguments->zeros,
                  "Zeros of the joints alone, fitted anew: for controllers that take mastering offsets and no more")
       ->needs("--deltas");
+  command->add_option("--session", arguments->session,
+                      "Whose base is exported, where the robot was calibrated in several sessions (default: the first)");
+  command->add_option("--target", arguments->target,
+                      "What the tool is, where the robot was calibrated with several targets (default: the first)");
   add_output_file(*command, "-o,--output", arguments->output, "File to write (default: standard output)");
   command->callback([arguments] { export_command(*arguments); });
 }

@@ -39,9 +39,10 @@ void predict_command(const PredictArguments& arguments) {
   } else {
     write_file(arguments.output, csv);
   }
-  warn(fmt::format("{}: {} poses, {} effects, {} correction{}", robot.robot.chain.name, predicted.count(),
+  warn(fmt::format("{}: {} poses, {} effects, {} correction; positions {}{}", robot.robot.chain.name, predicted.count(),
                    robot.robot.effects.size(), robot.correction ? "with a" : "no",
-                   arguments.output.empty() ? "" : ", written to " + arguments.output));
+                   report::frames_text(robot.robot.chain, predicted.poses),
+                   arguments.output.empty() ? "" : "; written to " + arguments.output));
 }
 
 }  // namespace

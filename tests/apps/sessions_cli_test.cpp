@@ -144,4 +144,77 @@ TEST(SessionsProgram, CompensateSummaryHasLinesAndTheFramesOfTheNominalArm) {
   EXPECT_NEAR(summary["mean_before_mm"].get<double>(), nominal, 0.2 * nominal);
 }
 
+TEST(SessionsProgram, ExportTakesTheFramesOfASessionOrRefuses) {
+  const Folder folder;
+  write_arms(folder);
+  simulate(folder, "real.yaml", 60, 1, "a.csv");
+  simulate(folder, "moved.yaml", 60, 2, "b.csv");
+  folder.write("two.csv", with_sessions(llmt::read_file(folder.file("a.csv")), llmt::read_file(folder.file("b.csv"))));
+  ASSERT_EQ(folder.run(fmt::format("{} calibrate {}arm.yaml two.csv -o two.yaml", robot_program, samples)).exit_code,
+            0);
+  const Outcome tuesday = folder.run(robot_program + " export two.yaml --c --session tuesday -o t.c");
+  EXPECT_EQ(tuesday.exit_code, 0) << tuesday.err;
+  EXPECT_NE(tuesday.out.find("positions of the tool, in the frame of the instrument in the session tuesday"),
+            std::string::npos)
+      << tuesday.out;
+  EXPECT_NE(llmt::read_file(folder.file("t.h")).find("in the frame of the instrument in the session tuesday"),
+            std::string::npos);
+  const Outcome monday = folder.run(robot_program + " export two.yaml --c -o m.c");
+  EXPECT_NE(monday.out.find("in the session monday"), std::string::npos) << monday.out;
+  EXPECT_NE(llmt::read_file(folder.file("t.c")), llmt::read_file(folder.file("m.c")));
+  const Outcome unknown = folder.run(robot_program + " export two.yaml --kinematics --session sunday");
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_NE(unknown.err.find("the robot was not calibrated with the session \"sunday\"; it knows monday, tuesday"),
+            std::string::npos)
+      << unknown.err;
+}
+
+TEST(SessionsProgram, ACalibrationSaysWhatItWasMadeFrom) {
+  const Folder folder;
+  write_arms(folder);
+  simulate(folder, "real.yaml", 60, 1, "a.csv");
+  const std::string command = fmt::format(
+      "SOURCE_DATE_EPOCH=86400 {} calibrate {}arm.yaml a.csv --robust --instrument 'AT960, 750123' --serial-number 7 "
+      "-o c.yaml",
+      robot_program, samples);
+  const Outcome run = folder.run(command + " --json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json made = nlohmann::json::parse(run.out)["made_from"];
+  EXPECT_EQ(made["date"], "1970-01-02");
+  EXPECT_EQ(made["program"].get<std::string>().substr(0, 11), "llmt-robot ");
+  EXPECT_EQ(made["options"], nlohmann::json({"--robust"}));
+  EXPECT_EQ(made["instrument"], "AT960, 750123");
+  EXPECT_EQ(made["serial_number"], "7");
+  // By another program: coreutils.
+  const std::string sum = folder.run("sha256sum a.csv").out.substr(0, 64);
+  ASSERT_EQ(made["files"].size(), 2U);
+  EXPECT_EQ(made["files"][1], nlohmann::json({{"role", "measurements"}, {"name", "a.csv"}, {"sha256", sum}}));
+  const std::string yaml = llmt::read_file(folder.file("c.yaml"));
+  EXPECT_NE(yaml.find(sum), std::string::npos) << yaml;
+  // The file can be used, and threads and names of outputs do not change it.
+  EXPECT_EQ(folder.run(robot_program + " check c.yaml a.csv --same-session").exit_code, 0);
+  ASSERT_EQ(folder.run(command + " --threads 1 --plot p.svg --json >/dev/null; mv c.yaml d.yaml; " + command).exit_code, 0);
+  EXPECT_EQ(llmt::read_file(folder.file("c.yaml")), yaml);
+  // A pipe has no bytes to sum up a second time.
+  const Outcome piped = folder.run(fmt::format("cat a.csv | {} calibrate {}arm.yaml /dev/stdin --json", robot_program, samples));
+  ASSERT_EQ(piped.exit_code, 0) << piped.err;
+  EXPECT_EQ(nlohmann::json::parse(piped.out)["made_from"]["files"][1]["sha256"], "not known: no regular file");
+}
+
+TEST(SessionsProgram, PosesBeyondTheCalibratedRangesAreNamed) {
+  const Folder folder;
+  write_arms(folder);
+  simulate(folder, "real.yaml", 60, 1, "a.csv");
+  ASSERT_EQ(folder.run(fmt::format("{} calibrate {}arm.yaml a.csv -o c.yaml", robot_program, samples)).exit_code, 0);
+  folder.run("cut -d, -f1-6 a.csv | head -4 | sed '1s/$/,payload_kg/; 2s/$/,40/; 3,4s/$/,0/' > p.csv");
+  const Outcome run = folder.run(robot_program + " predict c.yaml p.csv");
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_NE(run.err.find("1 of 3 poses lie beyond the calibrated ranges: payload from 0 to 40 kg, calibrated from "),
+            std::string::npos)
+      << run.err;
+  EXPECT_NE(run.err.find("; positions of the tool, in the frame of the instrument"), std::string::npos) << run.err;
+  folder.run("cut -d, -f1-6 a.csv | head -4 > q.csv");
+  EXPECT_EQ(folder.run(robot_program + " predict c.yaml q.csv").err.find("beyond"), std::string::npos);
+}
+
 }  // namespace sessions

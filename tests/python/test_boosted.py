@@ -268,9 +268,10 @@ model = {"format": "llmt-boosted-model", "version": 1, "inputs": inputs,
                    "trees": [{"splits": [], "leaves": [leaf]}] * 300}]}
 open(sys.argv[1], "w").write(json.dumps(model))
 X = np.random.default_rng(0).uniform(size=(1000, n))
+model = llmt.load(sys.argv[1])  # imports what it needs: Python ends by SIGINT where one came during an import, caught or not
 try:
     print("ready", flush=True)
-    llmt.load(sys.argv[1]).explain(X[:1], X)
+    model.explain(X[:1], X)
 except KeyboardInterrupt:
     print("interrupted", sum(t.name != "MainThread" for t in threading.enumerate()), flush=True)
 """

@@ -64,8 +64,8 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
                    bool correct, int folds, bool contiguous, bool new_session, bool robust,
                    const std::vector<std::string>& fixed, const std::vector<std::string>& only,
                    const std::map<std::string, double>& priors, int max_leaves, Eigen::Index min_leaf,
-                   const std::string& accept_suspicion, std::uint64_t seed, int threads, bool quality, bool page,
-                   const nb::object& report) {
+                   const std::string& accept_suspicion, double limit_mm, std::uint64_t seed, int threads, bool quality,
+                   bool page, const nb::object& report) {
   require_page(page);
   report::CalibrationTask task{.robot_file = arm.name,
                                .data_file = measured.first,
@@ -74,7 +74,8 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
                                .quality = quality,
                                .page = page,
                                .new_session = new_session,
-                               .accept_suspicion = accept_suspicion};
+                               .accept_suspicion = accept_suspicion,
+                               .limit_mm = limit_mm};
   task.options.correct = correct;
   task.options.folds = folds;
   task.options.kind = contiguous ? FoldKind::contiguous : FoldKind::random;
@@ -287,9 +288,11 @@ nb::dict predict_poses(const Arm& arm, const Source& at, const Reading& reading,
 }
 
 // C source and header.
-nb::dict export_c(const Arm& arm, const std::string& name) {
+nb::dict export_c(const Arm& arm, const std::string& name, const std::string& session, const std::string& target) {
   Outcome outcome;
-  const CSource c = robotics::to_c(report::arm_alone(arm.name, arm.robot, outcome.warn()), name, name + ".h");
+  robotics::CorrectedRobot robot = report::arm_alone(arm.name, arm.robot, outcome.warn());
+  robot.robot.chain = robotics::in_session(std::move(robot.robot.chain), session, target);
+  const CSource c = robotics::to_c(robot, name, name + ".h");
   nb::dict result = outcome.dict("", nullptr);
   result["source"] = c.source;
   result["header"] = c.header;
@@ -297,20 +300,13 @@ nb::dict export_c(const Arm& arm, const std::string& name) {
 }
 
 // The geometry: differences from `nominal`, or poses of the joints without it.
-nb::dict export_geometry(const Arm& arm, const Arm* nominal) {
-  const robotics::Robot& robot = arm.robot.robot;
+nb::dict export_geometry(const Arm& arm, const Arm* nominal, bool zeros, const std::string& session,
+                         const std::string& target) {
   Outcome outcome;
-  if (!robot.effects.empty() || arm.robot.correction) {
-    outcome.warn()(
-        finding("effects_left_out",
-                "The table holds the geometry alone: effects and correction are left out; compensate() has them"));
-  }
-  if (const std::string uncertain = report::uncertain_text(robot); !uncertain.empty()) {
-    outcome.warn()(report::uncertain_values_warning(uncertain));
-  }
-  return outcome.dict(nominal != nullptr ? report::deltas_csv(robot.chain, nominal->robot.robot.chain)
-                                         : report::kinematics_yaml(robot.chain),
-                      nullptr);
+  robotics::CorrectedRobot robot = arm.robot;
+  robot.robot.chain = robotics::in_session(std::move(robot.robot.chain), session, target);
+  const robotics::Chain* from = nominal != nullptr ? &nominal->robot.robot.chain : nullptr;
+  return outcome.dict(report::geometry_table(robot, from, zeros, outcome.warn()), nullptr);
 }
 
 }  // namespace
@@ -319,8 +315,8 @@ void add_robot_tasks(nb::module_& module) {
   using nb::arg;
   module.def("calibrate", &calibrate, arg("robot"), arg("measured"), arg("test").none(), arg("reading"), nb::kw_only(),
              arg("correct"), arg("folds"), arg("contiguous"), arg("new_session"), arg("robust"), arg("fixed"),
-             arg("only"), arg("priors"), arg("max_leaves"), arg("min_leaf"), arg("accept_suspicion"), arg("seed"),
-             arg("threads"), arg("quality"), arg("page"), arg("report").none());
+             arg("only"), arg("priors"), arg("max_leaves"), arg("min_leaf"), arg("accept_suspicion"), arg("limit_mm"),
+             arg("seed"), arg("threads"), arg("quality"), arg("page"), arg("report").none());
   module.def("discover", &discover, arg("robot"), arg("measured"), arg("test").none(), arg("reading"), nb::kw_only(),
              arg("held_out"), arg("folds"), arg("contiguous"), arg("catalogue").none(), arg("mass_uncertainty"),
              arg("accept_suspicion"), arg("seed"), arg("page"), arg("report").none());
@@ -335,8 +331,9 @@ void add_robot_tasks(nb::module_& module) {
   module.def("simulate", &simulate, arg("robot"), arg("count"), arg("at").none(), arg("reading"), nb::kw_only(),
              arg("noise_um"), arg("seed"));
   module.def("predict", &predict_poses, arg("robot"), arg("at"), arg("reading"), nb::kw_only(), arg("as_measured"));
-  module.def("export_c", &export_c, arg("robot"), arg("name"));
-  module.def("export_geometry", &export_geometry, arg("robot"), arg("nominal").none());
+  module.def("export_c", &export_c, arg("robot"), arg("name"), arg("session"), arg("target"));
+  module.def("export_geometry", &export_geometry, arg("robot"), arg("nominal").none(), arg("zeros"), arg("session"),
+             arg("target"));
 }
 
 }  // namespace llmt::python

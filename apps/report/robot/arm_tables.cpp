@@ -19,6 +19,7 @@ robotics::Measurements predicted_table(const std::string& file, const robotics::
   predicted.session = robot.robot.chain.session;
   predicted.target = robot.robot.chain.target;
   name_made_up(given, predicted.poses, warn);
+  name_uncovered(robot.robot, predicted.poses, warn);
   const Eigen::Index count = predicted.poses.count();
   predicted.positions_mm.resize(count, 3);
   std::vector<Eigen::Matrix3d> rotations;

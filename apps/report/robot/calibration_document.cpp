@@ -60,7 +60,9 @@ std::string kept_length(const CalibrationReport& report) {
 // What the tables of errors are of, and what was decided by them.
 std::vector<std::string> error_sentences(const CalibrationRun& run) {
   const CalibrationReport& report = run.report;
-  std::vector<std::string> lines = {"nominal: base and tool fitted to the poses, everything else as described."};
+  std::vector<std::string> lines = {
+      fmt::format("Positions are {}.", frames_text(report.calibration.robot.chain, run.measurements.poses)),
+      "nominal: base and tool fitted to the poses, everything else as described."};
   if (report.folds > 0) {
     lines.push_back(
         fmt::format("held-out: on poses that were left out of the fit{}. in-sample: on the poses that were fitted.",
@@ -68,6 +70,9 @@ std::vector<std::string> error_sentences(const CalibrationRun& run) {
   }
   const bool are_sweeps = report.folds > 0 && !robotics::sweeps_of(run.measurements.poses).empty();
   if (are_sweeps) lines.emplace_back("The poses move one joint at a time: whole sweeps are held out.");
+  if (report.folds > 0 && !are_sweeps && !robotics::path_of(run.measurements.poses).empty()) {
+    lines.emplace_back("The poses lie along a path: whole stretches of it are held out.");
+  }
   if (report.correction) {
     std::vector<std::string> leaves;
     for (const PartitionSummary& partition : report.correction->summary.partitions) {
@@ -80,8 +85,8 @@ std::vector<std::string> error_sentences(const CalibrationRun& run) {
   if (!report.decision.empty()) lines.push_back(report.decision);
   if (!run.used || run.used->outside.empty()) return lines;
   std::vector<std::string> joints;
-  for (const robotics::JointBeyond& range : run.used->beyond) {
-    joints.push_back(fmt::format("{} {:.0f} to {:.0f} {} (measured {:.0f} to {:.0f})", range.joint, range.used_low,
+  for (const robotics::Beyond& range : run.used->beyond) {
+    joints.push_back(fmt::format("{} {:.0f} to {:.0f} {} (measured {:.0f} to {:.0f})", range.name, range.used_low,
                                  range.used_high, range.unit, range.measured_low, range.measured_high));
   }
   lines.push_back(fmt::format(

@@ -2,6 +2,8 @@
 
 #include "report/robot/calibration_run.hpp"
 #include "report/robot/measurement_text.hpp"
+#include "report/robot/input_checks.hpp"
+#include "report/robot/provenance.hpp"
 
 namespace llmt::report {
 namespace {
@@ -47,6 +49,7 @@ Json calibration_json(const CalibrationRun& run, const std::string& output) {
   json["contiguous"] = run.task.options.kind == FoldKind::contiguous;
   json["grouped_by_pose"] = report.grouped;
   if (!robotics::sweeps_of(measurements.poses).empty()) json["sweeps"] = true;
+  if (!robotics::path_of(measurements.poses).empty()) json["path"] = true;
   for (const JudgedModel& row : run.models) {
     Json entry;
     entry["in_sample_mm"] = figures_json(error_figures(row.stage.in_sample_mm));
@@ -112,6 +115,8 @@ Json calibration_json(const CalibrationRun& run, const std::string& output) {
                              {"deviation_outside_mm", run.used->deviation_outside_mm}};
   }
   if (run.details) json["quality"] = details_json(*run.details, run.learning);
+  if (const auto& made = report.calibration.robot.calibration->made_from) json["made_from"] = provenance_json(*made);
+  json["frame"] = frames_text(report.calibration.robot.chain, measurements.poses);
   json["unused_columns"] = measurements.unused_columns;
   json["output"] = output.empty() ? Json(nullptr) : Json(output);
   return json;

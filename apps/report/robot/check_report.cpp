@@ -65,12 +65,10 @@ std::string coverage_text(const CheckFacts& facts) {
   }
   if (check.uncovered.empty()) return text;
   const std::vector<Eigen::Index> lines = lines_of(measurements, check.uncovered);
-  text += fmt::format("{} of {} readings lie beyond the calibrated joint ranges ({}):\n", check.uncovered.size(),
+  text += fmt::format("{} of {} readings lie beyond the calibrated ranges ({}):\n", check.uncovered.size(),
                       check.judged.size(), facts.face.rows(lines, most));
-  for (const robotics::JointBeyond& joint : check.beyond) {
-    text += fmt::format("  {} from {:.4g} to {:.4g} {}, calibrated from {:.4g} to {:.4g} ({})\n", joint.joint,
-                        joint.used_low, joint.used_high, joint.unit, joint.measured_low, joint.measured_high,
-                        facts.face.rows(lines_of(measurements, joint.rows), most));
+  for (const robotics::Beyond& own : check.beyond) {
+    text += fmt::format("  {} ({})\n", robotics::to_string(own), facts.face.rows(lines_of(measurements, own.rows), most));
   }
   if (check.too_few_covered) {
     return text + "The others are too few to say what moved.\n";
@@ -178,17 +176,21 @@ Json moved_json(const std::vector<Moved>& all) {
 Json uncovered_json(const robotics::Measurements& measurements, const RobotCheck& check) {
   if (!check.has_ranges) return nullptr;
   Json joints = Json::array();
-  for (const robotics::JointBeyond& joint : check.beyond) {
-    joints.push_back({{"joint", joint.joint},
-                      {"unit", joint.unit},
-                      {"calibrated", {joint.measured_low, joint.measured_high}},
-                      {"used", {joint.used_low, joint.used_high}},
-                      {"lines", lines_of(measurements, joint.rows)}});
+  Json conditions = Json::array();
+  for (const robotics::Beyond& own : check.beyond) {
+    const bool is_condition = own.name == "payload" || own.name == "temperature";
+    (is_condition ? conditions : joints)
+        .push_back({{is_condition ? "condition" : "joint", own.name},
+                    {"unit", own.unit},
+                    {"calibrated", {own.measured_low, own.measured_high}},
+                    {"used", {own.used_low, own.used_high}},
+                    {"lines", lines_of(measurements, own.rows)}});
   }
   const bool is_judged = !check.too_few_covered;
   return {{"readings", check.uncovered.size()},
           {"lines", lines_of(measurements, check.uncovered)},
           {"joints", std::move(joints)},
+          {"conditions", std::move(conditions)},
           {"covered_error_mm", is_judged ? figures_json(check.covered_error) : Json(nullptr)},
           {"good_where_covered", is_judged ? Json(check.good_where_covered) : Json(nullptr)},
           {"moved_beyond", moved_json(check.moved_beyond)}};

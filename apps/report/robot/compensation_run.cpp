@@ -23,12 +23,9 @@ using robotics::Outcome;
 
 // The robot as it stands in the session and with the target that the table names.
 CorrectedRobot in_frames(CorrectedRobot robot, const robotics::Observation& frames) {
-  robotics::Chain& chain = robot.robot.chain;
-  const auto frame_of = [](const std::vector<robotics::NamedFrame>& all, const std::string& name) {
-    return std::ranges::find(all, name, &robotics::NamedFrame::name)->frame;
-  };
-  if (!frames.base.empty()) chain.base = frame_of(chain.bases, frames.base);
-  if (!frames.tool.empty()) chain.tool = frame_of(chain.tools, frames.tool);
+  std::string target = frames.tool;  // see robotics::in_session()
+  if (!frames.base.empty()) target = frames.tool.substr(std::min(frames.tool.size(), frames.base.size() + 1));
+  robot.robot.chain = robotics::in_session(std::move(robot.robot.chain), frames.base, target);
   return robot;
 }
 
@@ -186,6 +183,7 @@ CompensationRun run_compensation(const CorrectedRobot& given, robotics::TargetTa
   run.found =
       robotics::compensate(robot, run.targets, {.tolerance_mm = run.task.tolerance_mm, .progress = solving.progress()});
   name_made_up(start, run.found.commands, warn);
+  name_uncovered(robot.robot, run.found.commands, warn);
   name_rows(run, warn);
   const std::vector<std::string>& unused = run.table.unused_columns;
   if (!unused.empty()) {
@@ -241,6 +239,7 @@ Json compensation_json(const CompensationRun& run, const std::string& output) {
     json["outcomes"][robotics::to_string(outcome)] = std::ranges::count(found.outcomes, outcome);
   }
   json["uncovered"] = std::ranges::count_if(found.uncovered, [](const std::string& text) { return !text.empty(); });
+  json["frame"] = frames_text(run.robot.robot.chain);
   json["mean_before_mm"] = found.before_mm.mean();
   json["mean_after_mm"] = found.after_mm.mean();
   json["max_after_mm"] = found.after_mm.maxCoeff();
@@ -254,12 +253,12 @@ std::string compensation_text(const CompensationRun& run, const std::string& out
   const auto uncovered = std::ranges::count_if(found.uncovered, [](const std::string& text) { return !text.empty(); });
   return fmt::format(
       "{}: {} targets, {} reached; {} at jumps of the model, {} at limits, {} unreachable, {} on another branch, {} "
-      "near singular poses{}.{}{}",
+      "near singular poses{}.\nTargets are {}.{}{}",
       run.robot.robot.chain.name, found.outcomes.size(), of(Outcome::reached), of(Outcome::jump), of(Outcome::limit),
       of(Outcome::unreachable), of(Outcome::branch), of(Outcome::singular),
       uncovered > 0 ? fmt::format("; {} outside of the joint values that the correction was trained on", uncovered)
                     : "",
-      mean_distances(run.table, found), output.empty() ? "" : "\nWritten to " + output);
+      frames_text(run.robot.robot.chain), mean_distances(run.table, found), output.empty() ? "" : "\nWritten to " + output);
 }
 
 std::optional<Finding> compensation_refusal(const CompensationRun& run) {

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <set>
+
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
@@ -63,6 +65,38 @@ void name_made_up(const robotics::Poses& given, const robotics::Poses& completed
                            "of going from row to row, order counts the rows, everything else is neutral "
                            "(docs/commands.md)",
                            fmt::join(names, ", "))));
+}
+
+void name_uncovered(const robotics::Robot& robot, const robotics::Poses& used, const Warn& warn) {
+  if (!robot.calibration) return;
+  const std::vector<robotics::Beyond> beyond = robotics::beyond_calibrated(robot.chain, *robot.calibration, used);
+  if (beyond.empty()) return;
+  std::vector<std::string> ranges;
+  for (const robotics::Beyond& own : beyond) ranges.push_back(robotics::to_string(own));
+  warn(finding("beyond_calibrated",
+               fmt::format("{} of {} poses lie beyond the calibrated ranges: {}. No measurement says how far the model "
+                           "is off there",
+                           robotics::rows_beyond(beyond).size(), used.count(), fmt::join(ranges, "; "))));
+}
+
+std::string frames_text(const robotics::Chain& chain, const robotics::Poses& used) {
+  std::set<std::string> sessions;
+  std::set<std::string> targets;
+  for (const robotics::Observation& seen : used.observations) {
+    sessions.insert(seen.base.empty() ? chain.session : seen.base);
+    targets.insert(seen.tool.empty() ? chain.target : seen.tool);
+  }
+  if (used.observations.empty()) {
+    sessions = {chain.session};
+    targets = {chain.target};
+  }
+  const auto named = [](const std::set<std::string>& names, const char* what, const char* of_rows) -> std::string {
+    if (names.size() > 1) return of_rows;
+    return names.begin()->empty() ? "" : fmt::format(" {} {}", what, *names.begin());
+  };
+  const std::string target = named(targets, "target", " target of each row");
+  return fmt::format("of the{}, in the frame of the instrument{}", target.empty() ? " tool" : target,
+                     named(sessions, "in the session", " in the session of each row"));
 }
 
 std::string use_of_orientations(const robotics::Measurements& measurements, const Face& face) {

@@ -30,6 +30,13 @@ robotics::CorrectedRobot arm_alone(const std::string& file, robotics::CorrectedR
 /// Warns of the columns that effects need and that were not given.
 void name_made_up(const robotics::Poses& given, const robotics::Poses& completed, const Warn& warn);
 
+/// Warns of poses beyond the ranges that the robot was calibrated in.
+void name_uncovered(const robotics::Robot& robot, const robotics::Poses& used, const Warn& warn);
+
+/// What positions of the arm are, and in which frame: "of the tool, in the frame of the instrument". `used`: what the
+/// rows name, none: the chain's own frames.
+std::string frames_text(const robotics::Chain& chain, const robotics::Poses& used = {});
+
 /// What orientations of the file are used for, in two sentences; empty if there are none.
 std::string use_of_orientations(const robotics::Measurements& measurements, const Face& face);
 

@@ -10,6 +10,7 @@
 #include "report/robot/arms.hpp"
 #include "report/robot/calibration_document.hpp"
 #include "report/robot/measurement_text.hpp"
+#include "report/robot/provenance.hpp"
 #include "report/text/text.hpp"
 
 namespace llmt::report {
@@ -123,6 +124,7 @@ Document calibration_page(const CalibrationRun& of) {
       "",
       {block(coverage(of.nominal.chain, points.poses.joints)), correlations(of.report.calibration.result)}};
   document.sections.insert(document.sections.begin(), {size, left, measured});
+  for (Section& section : provenance_section(calibrated)) document.sections.push_back(std::move(section));
   return document;
 }
 

@@ -203,7 +203,15 @@ std::string header(const Robot& robot, const std::string& name) {
     text += fmt::format("   q[{}]: joint {}, {}\n", index++, j + 1,
                         robot.chain.joints[j].type == JointType::revolute ? "rad" : "mm");
   }
-  return text + with_name(R"(   Positions in mm, rotations as nine numbers, row by row. */
+  const auto named = [](const std::string& name, const char* what) {
+    return name.empty() ? std::string() : fmt::format(" {} {}", what, name);
+  };
+  // A name may hold what ends a comment.
+  std::string frames = fmt::format("   Positions are of the{}, in mm, in the frame of the instrument{};\n",
+                                   robot.chain.target.empty() ? " tool" : named(robot.chain.target, "target"),
+                                   named(robot.chain.session, "in the session"));
+  for (std::size_t at = frames.find("*/"); at != std::string::npos; at = frames.find("*/")) frames.erase(at, 1);
+  return text + frames + with_name(R"(   rotations are nine numbers, row by row. */
 #ifndef @_ROBOT_H
 #define @_ROBOT_H
 

@@ -265,6 +265,7 @@ Calibration calibrate(const Robot& robot, const Measurements& measurements, cons
   const Unmapped plain = unmapped(with_frames(robot, measurements.poses), measurements);
   Calibration calibration = calibrate_without_maps(plain.robot, plain.measurements, options);
   calibration.robot.calibration->joint_ranges = joint_ranges_of(robot.chain, measurements.poses);
+  calibration.robot.calibration->condition_ranges = condition_ranges_of(robot.chain, measurements.poses);
   for (Robot* fitted : {&calibration.robot, &calibration.registered}) {
     fitted->effects.insert(fitted->effects.end(), plain.maps.begin(), plain.maps.end());
   }

@@ -156,41 +156,63 @@ Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses&
   return deviations;
 }
 
-std::vector<JointBeyond> joints_beyond(const Chain& chain, const std::vector<std::array<double, 2>>& ranges,
-                                       const Poses& used) {
-  constexpr double slack = 0.1;  // of the range
-  if (ranges.size() != chain.joints.size()) {
-    throw std::invalid_argument(fmt::format("llmt::robotics::joints_beyond: there are {} ranges of {} joints",
+std::vector<Beyond> beyond_calibrated(const Chain& chain, const CalibrationRecord& record, const Poses& used) {
+  const std::vector<std::array<double, 2>>& ranges = record.joint_ranges;
+  if (!ranges.empty() && ranges.size() != chain.joints.size()) {
+    throw std::invalid_argument(fmt::format("llmt::robotics::beyond_calibrated: there are {} ranges of {} joints",
                                             ranges.size(), chain.joints.size()));
   }
-  std::vector<JointBeyond> beyond;
-  for (std::size_t j = 0; j < ranges.size() && used.count() > 0; ++j) {
-    const Joint& joint = chain.joints[j];
-    const auto [low, high] = ranges[j];
-    const Eigen::VectorXd values = used.joints.col(j) * to_limit_unit(joint);
-    // A joint that stood still is beyond its range where it would no longer be one that stood still.
-    const double margin = std::max(slack * (high - low), still_range(joint));
+  std::vector<Beyond> beyond;
+  if (used.count() == 0) return beyond;
+  const auto add = [&](const std::string& name, const std::string& unit, const std::array<double, 2>& range,
+                       double least_margin, const Eigen::VectorXd& values) {
+    constexpr double slack = 0.1;  // of the range
+    const double margin = std::max(slack * (range[1] - range[0]), least_margin);
     std::vector<Eigen::Index> rows;
     for (Eigen::Index i = 0; i < values.size(); ++i) {
-      if (values(i) < low - margin || values(i) > high + margin) rows.push_back(i);
+      if (values(i) < range[0] - margin || values(i) > range[1] + margin) rows.push_back(i);
     }
-    if (rows.empty()) continue;
-    beyond.push_back({joint.name, limit_unit(joint), low, high, values.minCoeff(), values.maxCoeff(), std::move(rows)});
+    if (rows.empty()) return;
+    beyond.push_back({name, unit, range[0], range[1], values.minCoeff(), values.maxCoeff(), std::move(rows)});
+  };
+  for (std::size_t j = 0; j < ranges.size(); ++j) {
+    const Joint& joint = chain.joints[j];
+    // A joint that stood still is beyond its range where it would no longer be one that stood still.
+    add(joint.name, limit_unit(joint), ranges[j], still_range(joint), used.joints.col(j) * to_limit_unit(joint));
+  }
+  constexpr double least = 0.5;  // kg, K
+  const auto values_of = [&](const std::string& column) -> Eigen::VectorXd {
+    const auto stated = used.covariates.find(column);
+    return stated == used.covariates.end() ? Eigen::VectorXd() : stated->second;
+  };
+  for (const auto& [column, range] : record.condition_ranges) {
+    const bool is_payload = column == "payload_kg";
+    Eigen::VectorXd values = values_of(column);
+    if (is_payload && values.size() == 0) values = Eigen::VectorXd::Constant(used.count(), chain.payload.mass_kg);
+    if (values.size() > 0) add(is_payload ? "payload" : "temperature", is_payload ? "kg" : "C", range, least, values);
   }
   return beyond;
 }
 
-std::vector<Eigen::Index> rows_beyond(const std::vector<JointBeyond>& joints) {
+std::vector<Eigen::Index> rows_beyond(const std::vector<Beyond>& beyond) {
   std::set<Eigen::Index> rows;
-  for (const JointBeyond& joint : joints) rows.insert(joint.rows.begin(), joint.rows.end());
+  for (const Beyond& own : beyond) rows.insert(own.rows.begin(), own.rows.end());
   return {rows.begin(), rows.end()};
+}
+
+std::string to_string(const Beyond& beyond) {
+  return fmt::format("{} from {:.4g} to {:.4g} {}, calibrated from {:.4g} to {:.4g}", beyond.name, beyond.used_low,
+                     beyond.used_high, beyond.unit, beyond.measured_low, beyond.measured_high);
 }
 
 Coverage coverage(const Calibration& calibration, const Poses& measured, const Poses& used, bool frames_are_known) {
   Coverage result;
   if (used.count() == 0) return result;
   const Chain& chain = calibration.robot.chain;
-  result.beyond = joints_beyond(chain, joint_ranges_of(chain, measured), used);
+  CalibrationRecord seen;
+  seen.joint_ranges = joint_ranges_of(chain, measured);
+  seen.condition_ranges = condition_ranges_of(chain, measured);
+  result.beyond = beyond_calibrated(chain, seen, used);
   result.outside = rows_beyond(result.beyond);
   std::vector<Eigen::Index> inside;
   for (Eigen::Index i = 0; i < used.count(); ++i) {

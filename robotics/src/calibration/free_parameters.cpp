@@ -134,12 +134,19 @@ bool has_known_sphere(const Poses& poses) {
   return std::ranges::any_of(poses.observations, is_known_sphere, &Observation::base);
 }
 
+// Between sockets.
+bool has_length(const Poses& poses) {
+  return std::ranges::any_of(poses.observations, [](const Observation& seen) {
+    return seen.reading == Reading::distance && is_socket(seen.base);
+  });
+}
+
 }  // namespace
 
 void keep_scale(const Robot& robot, const Poses& poses, const CalibrationOptions& options,
                 std::vector<std::string>& reasons) {
   const Chain& chain = robot.chain;
-  if (has_instrument(poses) || has_known_sphere(poses)) return;
+  if (has_instrument(poses) || has_known_sphere(poses) || has_length(poses)) return;
   const auto slides = [](const Joint& joint) { return joint.type == JointType::prismatic; };
   if (std::ranges::any_of(chain.joints, slides)) return;  // its travel is a length that is known
   const std::vector<discovery::Parameter> all = parameters(robot);

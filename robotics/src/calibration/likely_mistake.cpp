@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "calibration/orientation_mistake.hpp"
 #include "calibration/registration.hpp"
 #include "calibration/suspected_changes.hpp"
 #include "llmt/robotics/calibration.hpp"
@@ -237,9 +238,8 @@ std::vector<Explanation> mistakes_of_rows(const Robot& robot, const Measurements
   return found;
 }
 
-}  // namespace
-
-std::optional<Suspicion> likely_mistake(const Robot& robot, const Measurements& measurements) {
+// Of what the positions show.
+std::optional<Suspicion> mistake_of_positions(const Robot& robot, const Measurements& measurements) {
   constexpr double far_better = 0.1;
   constexpr double of_spread = 0.05;
   constexpr double as_good = 1.05;
@@ -292,6 +292,13 @@ std::optional<Suspicion> likely_mistake(const Robot& robot, const Measurements& 
                    fmt::format("most likely {}: the described robot would then miss the points by {:.3g} mm instead of "
                                "{:.3g} mm",
                                fmt::join(words, ", or "), best.misfit_mm, misfit_mm)};
+}
+
+}  // namespace
+
+std::optional<Suspicion> likely_mistake(const Robot& robot, const Measurements& measurements) {
+  const std::optional<Suspicion> of_positions = mistake_of_positions(robot, measurements);
+  return of_positions ? of_positions : likely_orientation_mistake(robot, measurements);
 }
 
 }  // namespace llmt::robotics

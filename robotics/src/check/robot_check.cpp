@@ -135,9 +135,9 @@ std::vector<std::size_t> bad_rows(const CorrectedRobot& robot, const Measurement
   constexpr Eigen::Index one_of = 5;
   constexpr int most_rounds = 4;
   std::vector<std::size_t> out;
-  if (robot.robot.calibration && !robot.robot.calibration->joint_ranges.empty()) {
+  if (robot.robot.calibration) {
     for (const Eigen::Index row :
-         rows_beyond(joints_beyond(robot.robot.chain, robot.robot.calibration->joint_ranges, measurements.poses))) {
+         rows_beyond(beyond_calibrated(robot.robot.chain, *robot.robot.calibration, measurements.poses))) {
       out.push_back(static_cast<std::size_t>(row));
     }
   }
@@ -181,7 +181,7 @@ RobotCheck check_good_readings(const CorrectedRobot& robot, const Measurements& 
   RobotCheck result = check_all(robot, measurements, options);
   const CalibrationRecord* record = robot.robot.calibration ? &*robot.robot.calibration : nullptr;
   if (record == nullptr || record->joint_ranges.empty()) return result;
-  result.beyond = joints_beyond(robot.robot.chain, record->joint_ranges, measurements.poses);
+  result.beyond = beyond_calibrated(robot.robot.chain, *record, measurements.poses);
   result.uncovered = rows_beyond(result.beyond);
   if (!result.uncovered.empty()) result = decided_by_covered(robot, measurements, options, std::move(result));
   result.has_ranges = true;
@@ -209,8 +209,8 @@ RobotCheck check_robot(const CorrectedRobot& robot, const Measurements& measurem
   RobotCheck result = check_good_readings(robot, good, options);
   result.judged = left_of(measurements.count(), bad);
   for (Eigen::Index& row : result.uncovered) row = result.judged[row];
-  for (JointBeyond& joint : result.beyond) {
-    for (Eigen::Index& row : joint.rows) row = result.judged[row];
+  for (Beyond& own : result.beyond) {
+    for (Eigen::Index& row : own.rows) row = result.judged[row];
   }
   if (!bad.empty()) {
     const Eigen::VectorXd errors =

@@ -1,6 +1,7 @@
 #include "llmt/robotics/discovery/discovery.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include "calibration/joint_map_shift.hpp"
 #include "calibration/still_joints.hpp"
 #include "calibration/travel.hpp"
+#include "discovery/could_state.hpp"
 #include "discovery/gap_map.hpp"
 #include "discovery/input_mistakes.hpp"
 #include "discovery/investigation/constant_fit.hpp"
@@ -236,6 +238,35 @@ Discovery described(Discovery result, const Findings& found, const std::vector<O
   return result;
 }
 
+// An instrument's error has the image of one of the arm where this, searched for alone, explains the poses set aside as
+// well.
+std::optional<Objection> judge_instrument(const Robot& robot, const Unmapped& plain, const PoseSplit& split,
+                                          const Robots& robots, const Findings& found, const DiscoveryOptions& options,
+                                          Work& work) {
+  const auto is_of_instrument = [](const Name& name) {
+    return nature_of(name.effect.effect) == Nature::instrument;
+  };
+  if (std::ranges::none_of(found.names, is_of_instrument) || split.test.count() < 3) return {};
+  DiscoveryOptions of_arm = options;
+  std::erase_if(of_arm.catalogue, [](const EffectType& type) { return type.nature == Nature::instrument; });
+  const Findings other = search(calibrated(robot, plain, of_arm, work), of_arm);
+  const Robots others = fit_robots(robot, split.samples, plain.maps, other, of_arm);
+  if (others.is_worse || other.names.empty()) return {};
+  const auto errors = [&](const Robots& of) { return distances(positions(of.improved, split.test.poses), split.test); };
+  if (paired_difference(errors(others), errors(robots)).is_beyond_chance()) return {};
+  Objection objection{Reason::arm_instead};
+  for (std::size_t k = 0; k < found.names.size(); ++k) {
+    if (is_of_instrument(found.names[k])) objection.names.push_back(k);
+  }
+  std::vector<std::string> labels;
+  for (const Name& name : other.names) labels.push_back(effect_label(name.effect.effect));
+  objection.notes.push_back(
+      fmt::format("Errors of the arm alone ({}) explain the poses set aside as well as those with errors of the "
+                  "instrument: {:.4f} and {:.4f} mm. Measure from another place to tell.",
+                  fmt::join(labels, ", "), errors(others).mean(), errors(robots).mean()));
+  return objection;
+}
+
 // The stages, in the order in which they need each other:
 //
 // - split: poses are set aside for the verification before anything is looked at;
@@ -291,6 +322,10 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
   const std::optional<PairedDifference> gain = held_out_gain(robots, split);
   const Refits refits = robots.is_worse ? Refits{} : refits_of(robots, split, found, options);
   if (const std::optional<Objection> fails = judge_refits(refits)) objections.push_back(*fails);
+  if (const std::optional<Objection> arm = judge_instrument(robot, plain, split, robots, found, options, work)) {
+    objections.push_back(*arm);
+    add(arm->notes, notes);
+  }
   const std::optional<Objection> loss = judge_held_out_loss(gain, found.names.size());
   const bool is_withdrawn = robots.is_worse || loss;
   if (loss) {
@@ -299,6 +334,7 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
     robots = withdrawn(std::move(robots));
   }
   const double noise_mm = noise_of(found);
+  std::vector<std::string> statable = is_withdrawn ? Notes{} : could_state(robots, split, found, options);
   Discovery result = described(of_robots(std::move(robots), split, lack_of_fit, noise_mm), found, objections, split);
   result.held_out.gain = gain.value_or(PairedDifference{});
   for (std::size_t k = 0; k < std::min(result.effects.size(), refits.names.size()); ++k) {
@@ -306,6 +342,7 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
     result.effects[k].held = refits.names[k].held;
     result.effects[k].ranges = refits.names[k].ranges;
   }
+  result.could_state = std::move(statable);
   result.withdrawn = is_withdrawn;
   result.lack_of_fit = lack_of_fit;
   result.noise_mm = noise_mm;

@@ -117,8 +117,8 @@ Notes uncovered_poses(const Investigation& investigation, const Measurements& te
   const Coverage used = coverage(investigation.fitted, investigation.searched.poses, test.poses);
   if (used.outside.empty()) return {};
   std::vector<std::string> joints;
-  for (const JointBeyond& range : used.beyond) {
-    joints.push_back(fmt::format("{} {:.0f} to {:.0f} {} (searched {:.0f} to {:.0f})", range.joint, range.used_low,
+  for (const Beyond& range : used.beyond) {
+    joints.push_back(fmt::format("{} {:.0f} to {:.0f} {} (searched {:.0f} to {:.0f})", range.name, range.used_low,
                                  range.used_high, range.unit, range.measured_low, range.measured_high));
   }
   std::string deviation = fmt::format("{:.4f} mm", used.deviation_outside_mm);

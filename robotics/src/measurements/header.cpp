@@ -77,11 +77,17 @@ Header::Header(const Csv& csv, const Robot& robot, const std::vector<std::string
   if (targets_.size() > 1 && targets_.front().empty() != targets_.back().empty()) {
     refuse("there are positions without a target (x_mm) and with one (t1_x_mm): name them all");
   }
-  if (words_.contains("socket") && has("distance")) {
-    refuse("there are sockets and distances: fit them one after the other");
+  const bool has_sockets = words_.contains("socket");
+  if (words_.contains("from") && !(has_sockets && has("distance"))) {
+    refuse("a column from names the socket that a length is measured from: it needs the columns socket and distance_mm");
   }
-  const bool has_others = words_.contains("socket") || !targets_.empty() || has("distance");
-  if ((has_plane() || has_sphere()) && (has_others || (has_plane() && has_sphere()))) {
+  if (has_sockets && has("distance") && !words_.contains("from")) {
+    refuse(
+        "there are sockets and distances: a column from names the socket that a distance is measured from, where it is "
+        "the length between two sockets; distances from an instrument are fitted in a file of their own");
+  }
+  const bool has_readings = !targets_.empty() || (has("distance") && !has_sockets);
+  if ((has_plane() && (has_readings || has_sockets || has_sphere())) || (has_sphere() && has_readings)) {
     refuse(fmt::format("points on {} have no other readings beside them: fit them one after the other",
                        has_plane() ? "planes" : "spheres"));
   }
@@ -91,7 +97,7 @@ Header::Header(const Csv& csv, const Robot& robot, const std::vector<std::string
 void Header::take(const std::string& name, const std::string& column) {
   static const std::regex quantity("(q[0-9]+|r[xyz]|(t[0-9]+_)?[xyz]|distance|radius)(_([A-Za-z]+))?");
   static const std::regex quaternion("q[wxyz]");
-  static const std::set<std::string> words = {"target", "session", "socket", "plane", "sphere", "reference"};
+  static const std::set<std::string> words = {"target", "session", "socket", "plane", "sphere", "reference", "from"};
   static const std::regex covariate(
       "payload_kg|temp[0-9]*_C|time_s|order|pose|returned|dwelled|dir[0-9]+|tau[0-9]+_Nm|qmeas[0-9]+_(deg|rad|mm)|"
       "(sigma|U95)(_[xyz])?_(um|mm)");
@@ -253,9 +259,13 @@ Eigen::MatrixXd Header::points_mm(const std::string& target, std::array<bool, 3>
 Eigen::VectorXd Header::lengths_mm(const std::string& quantity) const {
   if (!has(quantity)) return {};
   const std::string& column = quantities_.at(quantity).column;
-  const Eigen::VectorXd values = factor(quantity, lengths_in_mm) * csv_.numbers(column);
+  // Beside sockets a row may have none.
+  const bool may_lack = words_.contains("socket");
+  const Eigen::VectorXd values =
+      factor(quantity, lengths_in_mm) *
+      (may_lack ? csv_.numbers_or_missing(std::vector<std::string>{column}).col(0).eval() : csv_.numbers(column));
   for (Eigen::Index row = 0; row < values.size(); ++row) {
-    if (values(row) > 0.0 && values(row) <= farthest_mm) continue;
+    if ((values(row) > 0.0 && values(row) <= farthest_mm) || (may_lack && std::isnan(values(row)))) continue;
     csv_.refuse(row, column, fmt::format("a {} must be above 0", quantity));
   }
   return values;

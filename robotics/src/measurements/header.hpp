@@ -40,7 +40,8 @@ class Header {
   /// no column.
   Eigen::MatrixXd points_mm(const std::string& target, std::array<bool, 3>& measured) const;
 
-  /// The column `distance`, or `radius` beside a column of spheres; above 0. Empty if there is no such column.
+  /// The column `distance`, or `radius` beside a column of spheres; above 0, or NaN where the cell is empty in a table
+  /// that has a column of sockets. Empty if there is no such column.
   Eigen::VectorXd distances_mm() const { return lengths_mm("distance"); }
   Eigen::VectorXd radii_mm() const { return lengths_mm("radius"); }
 
@@ -50,7 +51,7 @@ class Header {
   /// The column of the file that says in which sequence rows were read: order, or else time_s; empty if there is none.
   std::string sequence_column() const;
 
-  /// Names in the column `target`, `session`, `socket`, `plane`, `sphere` or `reference`, row by row; empty if there
+  /// Names in the column `target`, `session`, `socket`, `plane`, `sphere`, `reference` or `from`, row by row; empty if there
   /// is none.
   std::vector<std::string> words(const std::string& column) const;
 

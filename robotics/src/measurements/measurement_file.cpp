@@ -93,7 +93,7 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
   const bool has_targets = !targets.empty();
   const std::vector<Eigen::Index> stands = stands_of(rows, sessions, has_targets);
   const std::map<std::string, std::vector<std::string>> features = {
-      {"socket", header.words("socket")}, {"plane", header.words("plane")}, {"sphere", header.words("sphere")}};
+      {"socket", header.words("socket")}, {"plane", header.words("plane")}, {"sphere", header.words("sphere")}, {"from", header.words("from")}};
   FrameNames base_of(robot.chain.bases, robot.chain.session);
   FrameNames tool_of(robot.chain.tools, robot.chain.target);
   std::vector<Observation>& observations = measurements.poses.observations;
@@ -124,11 +124,12 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
                                "rows of this session first",
                                column_of_feature(sighting.feature), base_of.own()));
       }
-      const std::string column = column_of_feature(sighting.feature);
+      const std::string column = sighting.is_length ? "from" : column_of_feature(sighting.feature);
       observation.base = fmt::format("{} {}", sighting.feature, named(features.at(column), column));
     }
     observation.stand = stands[sighting.row];
-    if (header.has("distance") || header.has_sphere()) observation.reading = Reading::distance;
+    const bool is_distance = sighting.feature.empty() ? header.has("distance") : sighting.feature.ends_with("sphere");
+    if (is_distance || sighting.is_length) observation.reading = Reading::distance;
   }
   const bool plain = std::ranges::all_of(observations, [](const Observation& o) {
     return o.base.empty() && o.tool.empty() && o.reading == Reading::position;

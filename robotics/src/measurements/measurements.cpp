@@ -87,7 +87,9 @@ bool is_move(std::string_view column) { return column.starts_with("move"); }
 std::vector<Eigen::Index> measured_rows(const Measurements& measurements) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const std::vector<Observation>& seen = measurements.poses.observations;
+    const Eigen::Index axes = !seen.empty() && seen[i].reading == Reading::distance ? 1 : 3;
+    for (Eigen::Index axis = 0; axis < axes; ++axis) {
       if (measurements.measured[axis]) rows.push_back(3 * i + axis);
     }
   }

@@ -2,6 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <optional>
 #include <stdexcept>
 
@@ -126,8 +128,47 @@ std::vector<double> sweeps_of(const Poses& poses) {
   return are_sweeps ? labels : std::vector<double>{};
 }
 
+std::vector<double> path_of(const Poses& poses) {
+  constexpr Eigen::Index fewest = 50;  // poses
+  constexpr double near = 0.1;
+  constexpr double stretches = 25.0;
+  const Eigen::Index n = poses.joints.rows();
+  if (n < fewest) return {};
+  Eigen::RowVectorXd spread = ((poses.joints.rowwise() - poses.joints.colwise().mean()).colwise().norm()).eval();
+  spread = (spread.array() > 0.0).select(spread, 1.0);
+  const Eigen::MatrixXd scaled = poses.joints.array().rowwise() / spread.array();
+  std::vector<double> steps;
+  std::vector<double> others;
+  for (Eigen::Index i = 1; i < n; ++i) {
+    constexpr Eigen::Index factor = 7;  // pairs of any distance in the order
+    const double step = (scaled.row(i) - scaled.row(i - 1)).norm();
+    if (step > 0.0) steps.push_back(step);
+    others.push_back((scaled.row(i) - scaled.row((factor * i + n / 3) % n)).norm());
+  }
+  const auto middle = [](std::vector<double>& values) {
+    std::ranges::nth_element(values, values.begin() + std::ssize(values) / 2);
+    return values[values.size() / 2];
+  };
+  if (steps.empty() || !(middle(steps) <= near * middle(others))) return {};
+  std::vector<double> labels(n);
+  for (Eigen::Index i = 0; i < n; ++i) labels[i] = std::floor(stretches * static_cast<double>(i) / static_cast<double>(n));
+  // Repeats of a pose, and readings of a stand, stay together.
+  for (Eigen::Index i = 1; i < n; ++i) {
+    if (poses.joints.row(i) == poses.joints.row(i - 1)) labels[i] = labels[i - 1];
+  }
+  return labels;
+}
+
 std::vector<double> pose_labels(const Poses& poses) {
-  if (std::vector<double> sweeps = sweeps_of(poses); !sweeps.empty()) return sweeps;
+  std::vector<double> stretches = sweeps_of(poses);
+  if (stretches.empty()) stretches = path_of(poses);
+  if (!stretches.empty()) {
+    std::map<Eigen::Index, double> of_stand;  // its readings may stand far apart in the table
+    for (std::size_t i = 0; i < poses.observations.size(); ++i) {
+      stretches[i] = of_stand.try_emplace(poses.observations[i].stand, stretches[i]).first->second;
+    }
+    return stretches;
+  }
   const auto pose = poses.covariates.find("pose");
   if (pose != poses.covariates.end()) return {pose->second.begin(), pose->second.end()};
   std::vector<double> labels;

@@ -30,11 +30,16 @@ std::vector<Sighting> planes_of(const Csv& csv, const Words& targets) {
   return seen;
 }
 
-std::vector<Sighting> spheres_of(const Csv& csv, const Header& header, const Words& targets) {
+// Beside sockets, of the rows that name a sphere.
+std::vector<Sighting> spheres_of(const Csv& csv, const Header& header, const Words& targets, const Words& sockets) {
   std::vector<Sighting> seen;
   const bool is_known = header.has("radius");
   const Eigen::VectorXd radii = is_known ? header.radii_mm() : Eigen::VectorXd::Zero(csv.rows());
+  const Words spheres = header.words("sphere");
   for (Eigen::Index row = 0; row < csv.rows(); ++row) {
+    if (!sockets.empty() && spheres[row].empty()) continue;
+    if (!sockets.empty() && !sockets[row].empty()) csv.refuse(row, "sphere", "the row names a socket, too");
+    if (std::isnan(radii(row))) csv.refuse(row, "sphere", "its radius is missing");
     seen.push_back({.row = row,
                     .target = word_of(targets, row),
                     .value = {radii(row), 0.0, 0.0},
@@ -48,6 +53,32 @@ std::vector<Sighting> sockets_of(const Words& sockets, const Words& targets) {
   for (Eigen::Index row = 0; row < std::ssize(sockets); ++row) {
     if (sockets[row].empty()) continue;
     seen.push_back({.row = row, .target = word_of(targets, row), .feature = "socket"});
+  }
+  return seen;
+}
+
+// The socket of the row, as a point at that distance from another one, or from the centre of a sphere of known radius.
+std::vector<Sighting> lengths_of(const Csv& csv, const Header& header, const Words& targets, const Words& sockets) {
+  std::vector<Sighting> seen;
+  const Words from = header.words("from");
+  if (from.empty()) return seen;
+  const Eigen::VectorXd lengths = header.distances_mm();
+  const Words spheres = header.words("sphere");
+  const auto has = [](const Words& words, const std::string& name) { return std::ranges::find(words, name) != words.end(); };
+  for (Eigen::Index row = 0; row < csv.rows(); ++row) {
+    if (from[row].empty() && std::isnan(lengths(row))) continue;
+    if (from[row].empty()) csv.refuse(row, "from", "the socket is missing that the distance is measured from");
+    if (std::isnan(lengths(row))) csv.refuse(row, "from", "the distance from there is missing");
+    if (sockets[row].empty()) csv.refuse(row, "from", "a length ends at a socket: the row names none");
+    if (from[row] == sockets[row]) csv.refuse(row, "from", "the length ends at this socket: name the other one");
+    const bool is_sphere = has(spheres, from[row]);
+    if (!is_sphere && !has(sockets, from[row])) csv.refuse(row, "from", "no row touches this socket");
+    if (is_sphere && !header.has("radius")) csv.refuse(row, "from", "the radius of this sphere is not stated");
+    seen.push_back({.row = row,
+                    .target = word_of(targets, row),
+                    .value = {lengths(row), 0.0, 0.0},
+                    .feature = is_sphere ? "known sphere" : "socket",
+                    .is_length = true});
   }
   return seen;
 }
@@ -146,21 +177,25 @@ void add_points(const Csv& csv, const Header& header, const Words& targets, cons
 }  // namespace
 
 std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measurements& measurements) {
-  if (header.has("distance")) {
+  const Words targets = header.words("target");
+  const Words sockets = header.words("socket");
+  if (header.has("distance") && sockets.empty()) {
     measurements.measured = {true, false, false};
     return distances_of(csv, header);
   }
-  const Words targets = header.words("target");
   if (header.has_plane()) {
     measurements.measured = {false, false, true};
     return planes_of(csv, targets);
   }
-  if (header.has_sphere()) {
+  if (header.has_sphere() && sockets.empty()) {
     measurements.measured = {true, false, false};
-    return spheres_of(csv, header, targets);
+    return spheres_of(csv, header, targets, sockets);
   }
-  const Words sockets = header.words("socket");
   std::vector<Sighting> seen = sockets_of(sockets, targets);
+  const auto add = [&](std::vector<Sighting> more) { seen.insert(seen.end(), more.begin(), more.end()); };
+  if (header.has_sphere()) add(spheres_of(csv, header, targets, sockets));
+  add(lengths_of(csv, header, targets, sockets));
+  std::ranges::stable_sort(seen, {}, &Sighting::row);
   if (header.targets().empty() && !sockets.empty()) return seen;
   check_columns_of_points(csv, header, targets);
   add_points(csv, header, targets, sockets, seen, measurements);

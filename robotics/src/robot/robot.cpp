@@ -113,7 +113,7 @@ Robot without_errors_of_measuring(Robot robot) {
   if (std::ranges::none_of(robot.effects, is_of_measuring)) return robot;
   std::erase_if(robot.effects, is_of_measuring);
   robot.identified.clear();
-  robot.calibration.reset();
+  if (robot.calibration) robot.calibration->correlations.resize(0, 0);
   return robot;
 }
 

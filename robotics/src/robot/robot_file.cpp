@@ -214,6 +214,30 @@ std::vector<std::array<double, 2>> read_ranges(YamlMap& map, const Chain& chain)
   map.refuse("joint_ranges", fmt::format("there are {} ranges of {} joints", ranges.size(), chain.joints.size()));
 }
 
+std::map<std::string, std::array<double, 2>> read_conditions(YamlMap map) {
+  std::map<std::string, std::array<double, 2>> ranges;
+  for (const std::string& name : map.keys()) {
+    const std::vector<double> range = map.numbers(name, 2);
+    if (range[0] > range[1]) map.refuse(name, fmt::format("\"{}\" has {} above {}", name, range[0], range[1]));
+    ranges[name] = {range[0], range[1]};
+  }
+  return ranges;
+}
+
+Provenance read_provenance(YamlMap map) {
+  constexpr std::size_t most = 1000;
+  Provenance made{.program = map.text("program"), .date = map.text("date"), .sources = {}, .options = {}};
+  for (YamlMap entry : map.maps("files", most)) {
+    made.sources.push_back({entry.text("role"), entry.text("name"), entry.text("sha256")});
+    entry.finish({"role", "name", "sha256"});
+  }
+  if (map.has("options")) made.options = map.texts("options", most);
+  made.instrument = map.text_or("instrument", "");
+  made.serial_number = map.text_or("serial_number", "");
+  map.finish({"program", "date", "files", "options", "instrument", "serial_number"});
+  return made;
+}
+
 // The lower triangle by rows makes a matrix of the identified parameters that have a standard error.
 CalibrationRecord read_record(YamlMap map, const Robot& robot) {
   CalibrationRecord record;
@@ -233,7 +257,9 @@ CalibrationRecord read_record(YamlMap map, const Robot& robot) {
   record.noise_mm = not_negative("noise_mm");
   if (map.has("held_out_mm")) record.held_out_mm = not_negative("held_out_mm");
   if (map.has("held_out_sd_mm")) record.held_out_sd_mm = not_negative("held_out_sd_mm");
+  if (map.has("made_from")) record.made_from = read_provenance(map.map("made_from"));
   if (map.has("joint_ranges")) record.joint_ranges = read_ranges(map, robot.chain);
+  if (map.has("condition_ranges")) record.condition_ranges = read_conditions(map.map("condition_ranges"));
   const auto known =
       std::ranges::count_if(robot.identified, [](const auto& entry) { return entry.standard_error.has_value(); });
   if (map.has("correlations")) {
@@ -248,7 +274,8 @@ CalibrationRecord read_record(YamlMap map, const Robot& robot) {
       }
     }
   }
-  map.finish({"poses", "coordinates", "noise_mm", "held_out_mm", "held_out_sd_mm", "joint_ranges", "correlations"});
+  map.finish({"poses", "coordinates", "noise_mm", "held_out_mm", "held_out_sd_mm", "made_from", "joint_ranges",
+              "condition_ranges", "correlations"});
   return record;
 }
 

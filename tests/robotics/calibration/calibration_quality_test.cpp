@@ -66,7 +66,7 @@ TEST(CalibrationQuality, CoverageNamesTheJointsAndTheirUncertainty) {
   used.joints.topRows(10).col(1).array() += 2.0;
   const Coverage covered = coverage(calibration, poses, used);
   ASSERT_EQ(covered.beyond.size(), 1u);
-  EXPECT_EQ(covered.beyond[0].joint, "joint2");
+  EXPECT_EQ(covered.beyond[0].name, "joint2");
   EXPECT_EQ(covered.outside.size(), 10u);
   EXPECT_GT(covered.deviation_outside_mm, 1.5 * covered.deviation_inside_mm);
 }

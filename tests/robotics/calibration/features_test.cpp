@@ -34,6 +34,70 @@ TEST(Sockets, LeaveTheErrorOfTheirSeats) {
   EXPECT_LT(shape_error_mm(truth, calibration.robot), sigma_mm);
 }
 
+// The cells of a row's joints, each with a comma behind it, and the name of what it touches.
+std::string joints_of(const Measurements& touched, Eigen::Index row) {
+  std::string text;
+  for (const double q : touched.poses.joints.row(row)) text += fmt::format("{},", q);
+  return text;
+}
+
+std::string touched_by(const Measurements& touched, Eigen::Index row) {
+  const std::string& base = touched.poses.observations[row].base;
+  return base.substr(base.find(is_socket(base) ? "s" : "ball", base.find(' ')));
+}
+
+// A length between two sockets, stated in every row of one of them, is one kind of reading more.
+TEST(Sockets, ALengthBetweenThemShowsTheScale) {
+  Robot truth = perturbed(ur_like(), 0.5, 0.05, 3);
+  truth.chain.joints[1].a_mm += 1.0;  // the longest length is wrong, too
+  constexpr double sigma_mm = 0.02;
+  const Measurements touched = in_sockets(truth, 60, sigma_mm);
+  std::string with_length = "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,socket,from,distance_mm\n";
+  const double length_mm = (Eigen::RowVector3d(450, 250, 300) - Eigen::RowVector3d(-350, 400, 150)).norm();
+  for (Eigen::Index i = 0; i < touched.count(); ++i) {
+    const std::string name = touched_by(touched, i);
+    with_length += joints_of(touched, i) + name + (name == "s2" ? fmt::format(",s1,{}\n", length_mm) : ",,\n");
+  }
+  const Measurements readings = parse_measurements(with_length, "m.csv", truth);
+  EXPECT_GT(readings.count(), touched.count() + 30);
+  const Calibration alone = calibrate(ur_like(), touched);
+  const Calibration known = calibrate(ur_like(), readings);
+  EXPECT_TRUE(known.result.converged()) << known.result.reason;
+  EXPECT_FALSE(reasons_of(known).contains("joint2.a"));
+  EXPECT_GT(shape_error_mm(truth, alone.robot), 0.5);
+  EXPECT_LT(shape_error_mm(truth, known.robot), 0.03);
+  EXPECT_NEAR(known.robot.calibration->noise_mm, sigma_mm, 0.15 * sigma_mm);
+}
+
+TEST(Sockets, ALengthThatEndsNowhereIsRefused) {
+  const Robot robot = make_robot(Convention::dh, {{0, 300, 0, 0}});
+  const std::string head = "q1_rad,socket,from,distance_mm\n1,a,,\n";
+  EXPECT_EQ(refused(robot, head + "2,b,a,\n"), "m.csv:3: column \"from\": the distance from there is missing");
+  EXPECT_EQ(refused(robot, head + "2,b,,500\n"),
+            "m.csv:3: column \"from\": the socket is missing that the distance is measured from");
+  EXPECT_EQ(refused(robot, head + "2,b,c,500\n"), "m.csv:3: column \"from\": no row touches this socket");
+  EXPECT_EQ(refused(robot, head + "2,b,b,500\n"),
+            "m.csv:3: column \"from\": the length ends at this socket: name the other one");
+  EXPECT_EQ(refused(robot, head + "2,b,a,-5\n"), "m.csv:3: column \"distance_mm\": a distance must be above 0");
+  EXPECT_EQ(refused(robot, head + "2,b,a,500\n"), "no error");
+  EXPECT_NE(refused(robot, "q1_rad,socket,distance_mm\n1,a,3\n").find("a column from names the socket"),
+            std::string::npos);
+}
+
+TEST(Sockets, SpheresStandBesideThemInOneFile) {
+  const Robot truth = perturbed(ur_like(), 0.5, 0.05, 3);
+  const Measurements sockets = in_sockets(truth, 40, 0.01);
+  const Measurements spheres = on_spheres(truth, 60, 40.0, 0.01, true);
+  std::string both = "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,socket,sphere,radius_mm\n";
+  for (Eigen::Index i = 0; i < sockets.count(); ++i) both += joints_of(sockets, i) + touched_by(sockets, i) + ",,\n";
+  for (Eigen::Index i = 0; i < spheres.count(); ++i) {
+    both += fmt::format("{},{},40\n", joints_of(spheres, i), touched_by(spheres, i));
+  }
+  const Calibration calibration = calibrate(ur_like(), parse_measurements(both, "m.csv", truth));
+  EXPECT_TRUE(calibration.result.converged()) << calibration.result.reason;
+  EXPECT_LT(shape_error_mm(truth, calibration.robot), 0.03);
+}
+
 TEST(Sockets, StandBesideMeasuredPointsInOneFile) {
   const Robot robot = make_robot(Convention::dh, {{0, 300, 0, 0}});
   const std::string text =

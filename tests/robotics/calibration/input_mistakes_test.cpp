@@ -7,6 +7,7 @@
 
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/likely_mistake.hpp"
+#include "llmt/robotics/orientation.hpp"
 #include "robotics/observations.hpp"
 
 namespace llmt::robotics {
@@ -51,6 +52,35 @@ TEST(LikelyMistake, SignsZerosOrderAndAxesAreNamed) {
     EXPECT_NE(said.find(one.said), std::string::npos) << said;
   }
   EXPECT_EQ(said_after([](Measurements&) {}).find("most likely"), std::string::npos);
+}
+
+TEST(LikelyMistake, TheOrderOfAnglesAndQuaternionsIsNamed) {
+  const Robot truth = perturbed(ur_like(), 0.3, 0.05, 3);
+  Measurements seen = measure(truth, random_poses(truth.chain, 40, 4), 0.05, 5);
+  std::vector<Eigen::Matrix3d> rotations;
+  for (const Pose& pose : tool_poses(truth, seen.poses)) rotations.push_back(pose.rotation);
+  const auto said = [&](const std::string& written, const std::string& read) {
+    Robot described = ur_like();
+    described.chain.orientation = read;
+    seen.orientation = to_orientation(rotations, written);
+    const std::optional<Suspicion> found = likely_mistake(described, with_orientations(seen, described.chain));
+    return found ? found->name : std::string();
+  };
+  const std::vector<std::string> orders = {"xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
+  for (const std::string& written : orders) {
+    for (const std::string& read : orders) {
+      const std::string expected = written == read ? "" : "orientation_intrinsic_" + written;
+      EXPECT_EQ(said("intrinsic_" + written, "intrinsic_" + read), expected) << written << " read as " << read;
+    }
+  }
+  seen.orientation = to_orientation(rotations, "");
+  const Eigen::MatrixXd first = seen.orientation.values;
+  EXPECT_FALSE(likely_mistake(ur_like(), with_orientations(seen, ur_like().chain)));
+  seen.orientation.values << first.rightCols(3), first.leftCols(1);
+  EXPECT_EQ(likely_mistake(ur_like(), with_orientations(seen, ur_like().chain))->name, "orientation_w_last");
+  for (Eigen::Matrix3d& own : rotations) own.transposeInPlace();
+  seen.orientation = to_orientation(rotations, "");
+  EXPECT_EQ(likely_mistake(ur_like(), with_orientations(seen, ur_like().chain))->name, "orientation_inverse");
 }
 
 TEST(LikelyMistake, TheUnitOfOneTargetIsNamed) {

@@ -194,7 +194,7 @@ TEST(RobotCheck, WhatOnlyUncoveredPosesSayHasNotMoved) {
     ASSERT_EQ(same.uncovered.size(), 10U);
     for (std::size_t k = 0; k < 10; ++k) EXPECT_EQ(same.uncovered[k], 35 + static_cast<Eigen::Index>(k));
     ASSERT_EQ(same.beyond.size(), 1U);
-    EXPECT_EQ(same.beyond[0].joint, "joint2");
+    EXPECT_EQ(same.beyond[0].name, "joint2");
     EXPECT_NEAR(same.beyond[0].measured_high, 60.0, 8.0);
     EXPECT_TRUE(same.moved.empty()) << seed;
     EXPECT_FALSE(same.moved_beyond.empty()) << seed;

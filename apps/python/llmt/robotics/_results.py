@@ -81,6 +81,12 @@ class Calibration(_WithRobot):
         return answer
 
     @property
+    def verdict(self) -> str | None:
+        """Of the limit that was asked about: "pass", "fail" or "not evaluated"; None without ``limit_mm``."""
+        limit = self._data.get("limit")
+        return None if limit is None else str(limit["verdict"])
+
+    @property
     def parameters(self) -> Any:
         """``name``, ``unit``, ``value`` and ``standard_error`` of the identified parameters."""
         return table_of(self._data["parameters"])

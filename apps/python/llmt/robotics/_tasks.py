@@ -119,6 +119,7 @@ def calibrate(
     max_leaves: int = 0,
     min_leaf: int = 0,
     accept_suspicion: str = "",
+    limit_mm: float = 0.0,
     seed: int = 1,
     threads: int = 0,
     quality: bool = False,
@@ -150,6 +151,9 @@ def calibrate(
         Of a tree of the correction: most leaves, fewest poses in a leaf; 0: no limit, twice the coefficients.
     accept_suspicion
         Take the tables as they stand although they look like this mistake, by the name in the error: ``joint5_sign``.
+    limit_mm
+        Largest mean error to be accepted, on ``test`` or else on poses left out; 0: none. The result's ``verdict`` is
+        "pass", "fail" or "not evaluated".
     threads
         0: all. The result does not depend on it.
     quality
@@ -185,6 +189,7 @@ def calibrate(
         max_leaves=number("max_leaves", max_leaves, 0, 2**31 - 1, whole=True),
         min_leaf=number("min_leaf", min_leaf, 0, _MOST, whole=True),
         accept_suspicion=str(accept_suspicion),
+        limit_mm=number("limit_mm", limit_mm, 0.0, _LARGEST),
         seed=number("seed", seed, 0, 2**64 - 1, whole=True),
         threads=number("threads", threads, 0, 2**31 - 1, whole=True),
         quality=bool(quality),
@@ -441,12 +446,23 @@ def simulate(robot: Any, poses: Any = 200, *, noise_um: float = 0.0, seed: int =
     return frame_of(_warned(made)["csv"])
 
 
-def export(robot: Any, form: str, *, nominal: Any = None, name: str = "robot") -> Any:
+def export(
+    robot: Any,
+    form: str,
+    *,
+    nominal: Any = None,
+    name: str = "robot",
+    zeros: bool = False,
+    session: str = "",
+    target: str = "",
+) -> Any:
     """The arm for a controller: ``llmt-robot export``.
 
     ``form`` is ``"c"``: C99 source and header (two texts), whose names begin with ``name``; ``"kinematics"``: YAML with
     the pose of each joint; or ``"deltas"``: CSV with the differences of the Denavit-Hartenberg parameters from those of
-    ``nominal``.
+    ``nominal``, with ``zeros`` of the joints' zeros alone. Where the robot has more than the table holds, that is fitted
+    anew to the whole model, and a warning says how far the tool is off without the rest. ``session`` and ``target``:
+    whose base and tool, where the robot was calibrated with several.
     """
     arm = _robot_of(robot)
     if form not in ("c", "kinematics", "deltas"):
@@ -457,8 +473,12 @@ def export(robot: Any, form: str, *, nominal: Any = None, name: str = "robot") -
             if form == "deltas"
             else f"nominal is for the form 'deltas' alone, and form is {form!r}: leave nominal out"
         )
+    if zeros and form != "deltas":
+        raise ValueError(f"zeros is for the form 'deltas' alone, and form is {form!r}: leave zeros out")
     if form == "c":
-        made = _warned(_extension().export_c(arm._bound, name))
+        made = _warned(_extension().export_c(arm._bound, name, str(session), str(target)))
         return made["source"], made["header"]
-    made = _extension().export_geometry(arm._bound, None if nominal is None else _robot_of(nominal)._bound)
+    made = _extension().export_geometry(
+        arm._bound, None if nominal is None else _robot_of(nominal)._bound, bool(zeros), str(session), str(target)
+    )
     return _warned(made)["text"]

@@ -104,6 +104,7 @@ std::vector<std::string> error_sentences(const Discovery& found) {
   const robotics::HeldOut& held = found.held_out;
   std::vector<std::string> lines;
   if (const std::string largest = largest_sentence(found); !largest.empty()) lines.push_back(largest);
+  lines.insert(lines.end(), found.could_state.begin(), found.could_state.end());
   if (held.poses == 0) {
     lines.push_back(fmt::format("Mean error on the poses searched, none set aside: {:.4f} -> {:.4f} mm.",
                                 found.fitted_before.mean, found.fitted_after.mean));

@@ -13,6 +13,7 @@
 #include "llmt/robotics/likely_mistake.hpp"
 #include "report/robot/discovery/discovery_page.hpp"
 #include "report/robot/measurement_text.hpp"
+#include "report/robot/provenance.hpp"
 
 namespace llmt::report {
 namespace {
@@ -136,6 +137,9 @@ std::string discovery_text(const DiscoveryRun& run, const std::string& data, std
 
 Json discovery_run_json(const DiscoveryRun& run) {
   Json json = discovery_json(run.found);
+  json["frame"] = frames_text(run.found.improved.robot.chain, run.measurements.poses);
+  const auto& record = run.found.improved.robot.calibration;
+  if (record && record->made_from) json["made_from"] = provenance_json(*record->made_from);
   json["cross_validation"] = nullptr;
   if (run.folds) {
     json["cross_validation"] = {{"folds", run.folds->folds},

@@ -133,7 +133,16 @@ std::string list_of(const std::vector<std::string>& names) {
 
 std::vector<std::string> effect_sentences(const Discovery& found) {
   std::vector<std::string> sentences;
+  std::vector<std::string> tentative;
+  const bool any_is_confirmed = std::ranges::any_of(found.effects, &FoundEffect::confirmed);
   for (const Group& group : groups_of(found)) {
+    if (any_is_confirmed && !whole_of(found, *group.members.front()).confirmed) {
+      for (const FoundEffect* effect : group.members) {
+        const std::string what = fmt::format("{}, {}", kind_of(found, *effect), place_of(*effect));
+        if (std::ranges::find(tentative, what) == tentative.end()) tentative.push_back(what);
+      }
+      continue;
+    }
     std::vector<std::string> places;
     std::vector<std::string> rivals;
     for (const FoundEffect* effect : group.members) {
@@ -158,6 +167,12 @@ std::vector<std::string> effect_sentences(const Discovery& found) {
     if (rivals.size() > shown) text += fmt::format("; or one of {} more, see below", rivals.size() - shown);
     sentences.push_back(text);
   }
+  if (tentative.empty()) return sentences;
+  constexpr std::size_t most = 3;
+  const std::size_t more = tentative.size() > most ? tentative.size() - most : 0;
+  tentative.resize(tentative.size() - more);
+  sentences.push_back(fmt::format("  not certain, see below: {}{}", fmt::join(tentative, "; "),
+                                  more > 0 ? fmt::format("; and {} more", more) : ""));
   return sentences;
 }
 

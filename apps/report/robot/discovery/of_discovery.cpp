@@ -11,6 +11,7 @@
 #include "report/robot/arms.hpp"
 #include "report/robot/discovery/discovery_tables.hpp"
 #include "report/robot/discovery/effect_text.hpp"
+#include "report/robot/provenance.hpp"
 #include "report/text/text.hpp"
 
 namespace llmt::report {
@@ -285,6 +286,7 @@ Document discovery_report(const Discovered& of) {
     limits.blocks.push_back(visible_table(found));
   if (!found.not_testable.empty()) limits.blocks.push_back(untestable_table(found));
   document.sections.push_back(std::move(limits));
+  for (Section& section : provenance_section(found.improved.robot)) document.sections.push_back(std::move(section));
   return document;
 }
 

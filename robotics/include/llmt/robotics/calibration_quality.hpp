@@ -41,10 +41,11 @@ std::optional<RepeatNoise> noise_of_repeats(const Measurements& measurements);
 /// where `frames_are_known`: in another session they are fitted anew.
 Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses& poses, bool frames_are_known = false);
 
-/// A joint that is used a tenth of its measured range or more beyond it.
-struct JointBeyond {
-  std::string joint;
-  std::string unit;  ///< deg or mm
+/// A joint or a condition that is used a tenth of its calibrated range or more beyond it. Ranges narrower than 5 kg and
+/// 5 K count as that wide.
+struct Beyond {
+  std::string name;  ///< of the joint; payload, temperature
+  std::string unit;  ///< deg, mm, kg, C
   double measured_low = 0.0;
   double measured_high = 0.0;
   double used_low = 0.0;
@@ -52,17 +53,20 @@ struct JointBeyond {
   std::vector<Eigen::Index> rows;  ///< of the poses of use that are beyond
 };
 
-/// `ranges`: of the joints, deg or mm, as in CalibrationRecord::joint_ranges. Throws std::invalid_argument if their
-/// number is not that of the joints.
-std::vector<JointBeyond> joints_beyond(const Chain& chain, const std::vector<std::array<double, 2>>& ranges,
-                                       const Poses& used);
+/// By CalibrationRecord::joint_ranges and ::condition_ranges, joints first. A payload that the poses do not state is
+/// that of the chain; a temperature that they do not state is not judged. Throws std::invalid_argument if there are
+/// joint ranges, but not one for each joint.
+std::vector<Beyond> beyond_calibrated(const Chain& chain, const CalibrationRecord& record, const Poses& used);
 
-/// Rows in which any of the joints is beyond its range, ascending.
-std::vector<Eigen::Index> rows_beyond(const std::vector<JointBeyond>& joints);
+/// Rows in which anything is beyond its range, ascending.
+std::vector<Eigen::Index> rows_beyond(const std::vector<Beyond>& beyond);
+
+/// "joint2 from -90 to 120 deg, calibrated from -90 to 60 deg".
+std::string to_string(const Beyond& beyond);
 
 /// How poses of use lie to those that a calibration was made from.
 struct Coverage {
-  std::vector<JointBeyond> beyond;
+  std::vector<Beyond> beyond;
   std::vector<Eigen::Index> outside;  ///< rows_beyond()
   double deviation_inside_mm = 0.0;   ///< root mean square of position_deviations() there; 0 if there are none
   double deviation_outside_mm = 0.0;

@@ -21,7 +21,8 @@ struct Suspicion {
 
 /// Tries what goes wrong in files: units of angles, lengths, positions or of one target's points; signs, zeros, order
 /// and coupling of the joints; an axis of the instrument; the convention of the description; readings that slipped by a
-/// row, and an instrument that moved; one at a time, signs of several joints together, and two at once. Returns the
+/// row, and an instrument that moved; one at a time, signs of several joints together, and two at once; where positions
+/// show none, the order of angles and quaternions, if orientations are fitted. Returns the
 /// change with which the described robot, base and tool fitted, misses the points least in relation to their spread, if
 /// that is less than a tenth of the share by which it misses them as they stand, less than a twentieth of the spread,
 /// and less than a fiftieth of the arm's length; else nothing. However small the misfit is: a joint of the wrist moves

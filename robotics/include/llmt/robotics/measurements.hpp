@@ -79,8 +79,13 @@ std::vector<Eigen::Index> position_rows(const Poses& poses);
 /// while the same joint moves. Empty: the poses are no sweeps, or fewer than five.
 std::vector<double> sweeps_of(const Poses& poses);
 
-/// One number per row, equal where rows belong together and must not be torn apart: sweeps_of(), the column `pose`, or
-/// else Observation::stand. Empty: every row is a pose of its own.
+/// Numbers of 25 stretches, one per row, where poses follow each other along a path: the median step from row to row is
+/// at most a tenth of the median distance between rows anywhere in the table, each joint in units of its spread. Empty:
+/// it is no path, or there are fewer than 50 rows.
+std::vector<double> path_of(const Poses& poses);
+
+/// One number per row, equal where rows belong together and must not be torn apart: sweeps_of(), path_of(), the column
+/// `pose`, or else Observation::stand. Empty: every row is a pose of its own.
 std::vector<double> pose_labels(const Poses& poses);
 
 /// The mean of readings of one kind and one tool; of orientations relative to the reference of the first row.
@@ -124,6 +129,7 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name);
 ///   t1_x_mm t1_y_mm t1_z_mm t2_x_mm ...                  several targets in one pose; a cell may be empty
 ///   target, session                                      names: of what was looked at, of how the instrument stood
 ///   socket                                               name of what the tool's ball lies in, instead of positions
+///   from distance_mm                                     beside it: a certified length from another socket to this one
 ///   plane                                                name of a flat surface that the tool point lies on, likewise
 ///   sphere                                               name of a ball that the tool point lies on, likewise
 ///   radius_mm (also _m, _um)                             of that sphere, at the tool point; optional

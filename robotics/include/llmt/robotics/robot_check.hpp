@@ -59,7 +59,7 @@ struct CheckedError {
   bool still_good = false;
   bool has_ranges = false;  ///< the description has the joint ranges of the calibration
   /// Joints of new poses beyond those ranges. Where there are any, only the other poses decide on what moved.
-  std::vector<JointBeyond> beyond;
+  std::vector<Beyond> beyond;
   std::vector<Eigen::Index> uncovered;  ///< rows_beyond() of them
   bool too_few_covered = false;         ///< to say what moved: RobotCheck::moved is empty
 };

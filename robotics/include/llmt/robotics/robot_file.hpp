@@ -33,7 +33,9 @@ namespace llmt::robotics {
 ///          coefficients: [1e-4]}      # see FormulaTerm
 ///     identified:                    # optional; written by calibration, values stand above
 ///       - {parameter: joint1.a, state: free, standard_error: 0.01, unit: mm}
-///     calibration: {poses: 150, noise_mm: 0.03, held_out_mm: 0.05, held_out_sd_mm: 0.02, correlations: [0.1, ...]}
+///     calibration: {poses: 150, noise_mm: 0.03, held_out_mm: 0.05, held_out_sd_mm: 0.02, correlations: [0.1, ...],
+///       made_from: {program: llmt-robot 1.0.0, date: 2026-05-31, files: [{role: measurements, name: arm.csv, sha256:
+///         ...}], options: [--robust], instrument: ..., serial_number: ...}, condition_ranges: {payload_kg: [0, 10]}}
 ///                                    # optional, likewise; correlations: lower triangle by rows
 ///     correction: {model: arm.correction.json}          # optional
 ///

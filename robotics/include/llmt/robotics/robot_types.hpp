@@ -26,6 +26,23 @@ struct IdentifiedParameter {
   std::string state;                     ///< "free", or why it was fixed
 };
 
+/// A file that a calibration was made from.
+struct SourceFile {
+  std::string role;    ///< description, measurements, test
+  std::string name;    ///< without folders
+  std::string sha256;  ///< of its bytes, 64 hexadecimal digits
+};
+
+/// Where a calibrated description comes from, for those who audit it. Nothing is computed from it.
+struct Provenance {
+  std::string program;              ///< with its version
+  std::string date;                 ///< in UTC, as 2026-05-31
+  std::vector<SourceFile> sources;
+  std::vector<std::string> options; ///< of the command line, as they were given
+  std::string instrument = {};      ///< as the user states it; empty: nobody did
+  std::string serial_number = {};   ///< of the robot, likewise
+};
+
 /// How good a calibration was, for whoever asks later whether it still holds.
 struct CalibrationRecord {
   Eigen::Index poses = 0;                ///< that it was made from
@@ -34,6 +51,9 @@ struct CalibrationRecord {
   std::optional<double> held_out_mm;     ///< mean error on poses that took no part
   std::optional<double> held_out_sd_mm;  ///< standard deviation of these errors
   std::vector<std::array<double, 2>> joint_ranges;  ///< J, that the poses had; deg or mm as limits; empty: not known
+  /// Smallest and largest value of what the readings were taken under: payload_kg, temp_C.
+  std::map<std::string, std::array<double, 2>> condition_ranges = {};
+  std::optional<Provenance> made_from = {};
   /// L x L, of the identified parameters that have a standard error, in their order.
   Eigen::MatrixXd correlations;
 };

@@ -23,6 +23,7 @@ enum class Reason {
   instrument_residuals,  ///< the residuals are like an instrument's errors, whose image an effect of the arm may be
   still_joint,           ///< an effect of a joint that stands still
   both_signs,            ///< compliances of both signs in one arm
+  arm_instead,           ///< an instrument's error, where errors of the arm alone explain the poses set aside as well
   refits,                ///< it does not hold in four of five refits that leave out a fifth of the poses each
 };
 

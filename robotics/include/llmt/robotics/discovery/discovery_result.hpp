@@ -126,6 +126,7 @@ struct Discovery {
   /// Patterns of the part that the catalogue does not explain. Kind "noise": no candidate explains it, but no
   /// instrument scatters like that. Kind "outliers": more measurements fit nothing than can be told from an effect.
   std::vector<FoundPattern> unknown;
+  std::vector<std::string> could_state;           ///< what the user could state to know more, in sentences
   std::vector<FoundPattern> more;                 ///< patterns that are left beside effects that were named
   std::vector<BeyondPlausible> beyond_plausible;  ///< one for each family
   std::vector<Effect> maps;                       ///< joint maps that were added for the unknown effect

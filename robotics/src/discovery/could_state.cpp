@@ -1,0 +1,59 @@
+#include "discovery/could_state.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "discovery/investigation/pose_split.hpp"
+#include "llmt/robotics/effects.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+bool has_effect(const Robot& robot, const auto& is_meant) {
+  return std::ranges::any_of(robot.effects, [&](const Effect& own) { return is_meant(own); });
+}
+
+std::optional<std::string> payload_to_state(const Robots& robots, const PoseSplit& split, const Findings& found,
+                                            const DiscoveryOptions& options) {
+  constexpr double material = 0.05;
+  const Robot& improved = robots.improved.robot;
+  const bool is_stated =
+      improved.chain.payload.mass_kg > 0.0 || split.samples.poses.covariates.contains("payload_kg");
+  const auto bends = [](const Effect& own) { return effect_type(own.type).scales_with_mass; };
+  const auto is_payload = [](const Effect& own) { return own.type == "payload_error"; };
+  if (is_stated || split.test.count() < 3 || !has_effect(improved, bends) || has_effect(improved, is_payload)) return {};
+  Robot loaded = improved;
+  loaded.effects.push_back({"payload_error", "", {0.0, 0.0, 0.0, 0.0}});
+  const Measurements kept = without_rows(split.samples, found.investigation.verdict.outliers);
+  const Calibration fitted = calibrate(loaded, kept, options.calibration);
+  const Eigen::VectorXd without = distances(positions(robots.improved, split.test.poses), split.test);
+  const Eigen::VectorXd with =
+      distances(positions({fitted.robot, robots.improved.correction}, split.test.poses), split.test);
+  const PairedDifference gain = paired_difference(without, with);
+  const double mass = fitted.robot.effects.back().values[0];
+  if (!(mass > 0.0) || !gain.is_beyond_chance() || gain.mean < material * without.mean()) return {};
+  return fmt::format(
+      "State the payload (payload of the description, or a column payload_kg): with {:.3g} kg the poses set aside "
+      "would be missed by {:.4f} instead of {:.4f} mm.",
+      mass, with.mean(), without.mean());
+}
+
+}  // namespace
+
+std::vector<std::string> could_state(const Robots& robots, const PoseSplit& split, const Findings& found,
+                                     const DiscoveryOptions& options) {
+  std::vector<std::string> sentences;
+  if (const auto payload = payload_to_state(robots, split, found, options)) sentences.push_back(*payload);
+  const auto has_no_masses = [](const Effect& own) { return own.type == "joint_compliance_free_masses"; };
+  if (has_effect(robots.improved.robot, has_no_masses)) {
+    sentences.emplace_back(
+        "State the masses of the links and their centres (mass_kg, com_mm): a compliance then has a value, and holds "
+        "under other loads.");
+  }
+  return sentences;
+}
+
+}  // namespace llmt::robotics
