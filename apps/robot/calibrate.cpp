@@ -71,13 +71,12 @@ void calibrate_command(const CLI::App& command, CalibrateArguments arguments) {
   report::CalibrationRun run = report::run_calibration(
       described, read_measured(task.data_file, described, {}, arguments.reading), read_test, task);
   bar.clear();
-  run.report.calibration.robot.calibration->made_from =
-      provenance_of(command,
-                    {{"description", task.robot_file},
-                     {"measurements", task.data_file},
-                     {"test", task.test_file},
-                     {"column map", arguments.reading.columns}},
-                    arguments.stated);
+  run.report.calibration.robot.calibration->made_from = provenance_of(command,
+                                                                      {{"description", task.robot_file},
+                                                                       {"measurements", task.data_file},
+                                                                       {"test", task.test_file},
+                                                                       {"column map", arguments.reading.columns}},
+                                                                      arguments.stated);
   SavedRobot written;
   if (!arguments.output.empty() && !run.is_implausible) {
     written = save_corrected(run.report.best(), arguments.output, {task.robot_file, arguments.links});

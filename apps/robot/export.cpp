@@ -74,8 +74,7 @@ void export_command(const ExportArguments& arguments) {
     const robotics::UrdfLinks links = links_for(arguments.deltas_from, arguments.links, whole.robot);
     nominal = robotics::read_robot(arguments.deltas_from, links).chain;
   }
-  const std::string text =
-      report::geometry_table(whole, nominal ? &*nominal : nullptr, arguments.zeros, warn_of);
+  const std::string text = report::geometry_table(whole, nominal ? &*nominal : nullptr, arguments.zeros, warn_of);
   if (arguments.output.empty()) {
     print_bytes(text);
   } else {
@@ -103,8 +102,9 @@ void add_robot_export(CLI::App& app) {
       ->add_flag("--zeros", arguments->zeros,
                  "Zeros of the joints alone, fitted anew: for controllers that take mastering offsets and no more")
       ->needs("--deltas");
-  command->add_option("--session", arguments->session,
-                      "Whose base is exported, where the robot was calibrated in several sessions (default: the first)");
+  command->add_option(
+      "--session", arguments->session,
+      "Whose base is exported, where the robot was calibrated in several sessions (default: the first)");
   command->add_option("--target", arguments->target,
                       "What the tool is, where the robot was calibrated with several targets (default: the first)");
   add_output_file(*command, "-o,--output", arguments->output, "File to write (default: standard output)");

@@ -29,8 +29,9 @@ std::string today() {
 }  // namespace
 
 void add_stated(CLI::App& command, Stated& stated) {
-  command.add_option("--instrument", stated.instrument,
-                     "For the record: what measured, as \"AT960, 750123\"; written into the description, JSON and page");
+  command.add_option(
+      "--instrument", stated.instrument,
+      "For the record: what measured, as \"AT960, 750123\"; written into the description, JSON and page");
   command.add_option("--serial-number", stated.serial_number, "For the record: the robot's serial number");
 }
 
@@ -48,7 +49,7 @@ std::string sha256(const std::string& bytes) {
 robotics::Provenance provenance_of(const CLI::App& command,
                                    const std::vector<std::pair<std::string, std::string>>& files,
                                    const Stated& stated) {
-  static const std::set<std::string> without_effect = {"--output", "--report", "--plot",       "--json",
+  static const std::set<std::string> without_effect = {"--output",  "--report",  "--plot",       "--json",
                                                        "--threads", "--quality", "--instrument", "--serial-number"};
   robotics::Provenance made;
   made.program = "llmt-robot " LLMT_VERSION;

@@ -97,8 +97,7 @@ TEST(CheckProgram, PosesBeyondTheCalibratedRangesAreNamedByLineAndJoint) {
   cal.replace(range, cal.find(']', range) - range, "range_deg: [-20, 20");
   folder.write("narrow.yaml", cal);
   const Outcome run = folder.run(robot_program + " check narrow.yaml new.csv");
-  EXPECT_NE(run.out.find(" of 40 readings lie beyond the calibrated joint ranges (lines "), std::string::npos)
-      << run.out;
+  EXPECT_NE(run.out.find(" of 40 readings lie beyond the calibrated ranges (lines "), std::string::npos) << run.out;
   EXPECT_NE(run.out.find("  joint3 from -"), std::string::npos) << run.out;
   EXPECT_NE(run.out.find(", calibrated from -20 to 20 (lines "), std::string::npos) << run.out;
   const nlohmann::json json =

@@ -193,10 +193,12 @@ TEST(SessionsProgram, ACalibrationSaysWhatItWasMadeFrom) {
   EXPECT_NE(yaml.find(sum), std::string::npos) << yaml;
   // The file can be used, and threads and names of outputs do not change it.
   EXPECT_EQ(folder.run(robot_program + " check c.yaml a.csv --same-session").exit_code, 0);
-  ASSERT_EQ(folder.run(command + " --threads 1 --plot p.svg --json >/dev/null; mv c.yaml d.yaml; " + command).exit_code, 0);
+  ASSERT_EQ(folder.run(command + " --threads 1 --plot p.svg --json >/dev/null; mv c.yaml d.yaml; " + command).exit_code,
+            0);
   EXPECT_EQ(llmt::read_file(folder.file("c.yaml")), yaml);
   // A pipe has no bytes to sum up a second time.
-  const Outcome piped = folder.run(fmt::format("cat a.csv | {} calibrate {}arm.yaml /dev/stdin --json", robot_program, samples));
+  const Outcome piped =
+      folder.run(fmt::format("cat a.csv | {} calibrate {}arm.yaml /dev/stdin --json", robot_program, samples));
   ASSERT_EQ(piped.exit_code, 0) << piped.err;
   EXPECT_EQ(nlohmann::json::parse(piped.out)["made_from"]["files"][1]["sha256"], "not known: no regular file");
 }

@@ -18,6 +18,12 @@ std::string without_times(const std::string& json) {
   return std::regex_replace(json, times, "\"seconds\": 0");
 }
 
+// Nor may the version and the day of a record count.
+std::string without_origin(const std::string& text) {
+  static const std::regex origin("\"?(program|date)\"?: \"?(llmt-robot [0-9.]+|[0-9]{4}-[0-9]{2}-[0-9]{2})");
+  return std::regex_replace(text, origin, "$1");
+}
+
 // Every string that is not the name of a member becomes "".
 std::string without_words(const std::string& json) {
   std::string kept;
@@ -45,12 +51,12 @@ std::string run_and_hash(const std::string& folder, const std::string& command, 
       std::system(("cd '" + folder + "' && " + command + " >stdout.txt 2>stderr.txt </dev/null").c_str());
   const int exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   std::string text = "exit:" + std::to_string(exit_code);
-  const std::string json = without_times(llmt::read_file((path / "stdout.txt").string()));
+  const std::string json = without_origin(without_times(llmt::read_file((path / "stdout.txt").string())));
   if (json.empty()) return text;
   text += " json:" + hash_of(json) + " numbers:" + hash_of(without_words(json));
   for (const std::string& file : files) {
     const bool written = std::filesystem::exists(path / file);
-    text += " " + file + ":" + (written ? hash_of(llmt::read_file((path / file).string())) : "none");
+    text += " " + file + ":" + (written ? hash_of(without_origin(llmt::read_file((path / file).string()))) : "none");
   }
   return text;
 }

@@ -1,8 +1,8 @@
 #include <cmath>
 
 #include "report/robot/calibration_run.hpp"
-#include "report/robot/measurement_text.hpp"
 #include "report/robot/input_checks.hpp"
+#include "report/robot/measurement_text.hpp"
 #include "report/robot/provenance.hpp"
 
 namespace llmt::report {

@@ -68,7 +68,8 @@ std::string coverage_text(const CheckFacts& facts) {
   text += fmt::format("{} of {} readings lie beyond the calibrated ranges ({}):\n", check.uncovered.size(),
                       check.judged.size(), facts.face.rows(lines, most));
   for (const robotics::Beyond& own : check.beyond) {
-    text += fmt::format("  {} ({})\n", robotics::to_string(own), facts.face.rows(lines_of(measurements, own.rows), most));
+    text +=
+        fmt::format("  {} ({})\n", robotics::to_string(own), facts.face.rows(lines_of(measurements, own.rows), most));
   }
   if (check.too_few_covered) {
     return text + "The others are too few to say what moved.\n";

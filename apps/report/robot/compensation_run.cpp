@@ -258,7 +258,8 @@ std::string compensation_text(const CompensationRun& run, const std::string& out
       of(Outcome::unreachable), of(Outcome::branch), of(Outcome::singular),
       uncovered > 0 ? fmt::format("; {} outside of the joint values that the correction was trained on", uncovered)
                     : "",
-      frames_text(run.robot.robot.chain), mean_distances(run.table, found), output.empty() ? "" : "\nWritten to " + output);
+      frames_text(run.robot.robot.chain), mean_distances(run.table, found),
+      output.empty() ? "" : "\nWritten to " + output);
 }
 
 std::optional<Finding> compensation_refusal(const CompensationRun& run) {

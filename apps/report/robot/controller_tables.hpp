@@ -16,10 +16,10 @@ std::string kinematics_yaml(const robotics::Chain& described);
 /// of joints differ.
 std::string deltas_csv(const robotics::Chain& chain, const robotics::Chain& nominal);
 
-/// What a controller takes that knows geometry alone: kinematics_yaml(), or deltas_csv() from a nominal chain; of `zeros`
-/// alone, if the controller takes mastering offsets and no more. Where the robot has more than the table, this is fitted
-/// anew to the whole model, and `warn` gets how far the tool is off without the rest. It also gets the values that
-/// calibration could not determine alone. Throws as deltas_csv().
+/// What a controller takes that knows geometry alone: kinematics_yaml(), or deltas_csv() from a nominal chain; of
+/// `zeros` alone, if the controller takes mastering offsets and no more. Where the robot has more than the table, this
+/// is fitted anew to the whole model, and `warn` gets how far the tool is off without the rest. It also gets the values
+/// that calibration could not determine alone. Throws as deltas_csv().
 std::string geometry_table(const robotics::CorrectedRobot& robot, const robotics::Chain* nominal, bool zeros,
                            const Warn& warn);
 

@@ -94,6 +94,7 @@ std::string frames_text(const robotics::Chain& chain, const robotics::Poses& use
     if (names.size() > 1) return of_rows;
     return names.begin()->empty() ? "" : fmt::format(" {} {}", what, *names.begin());
   };
+  if (targets == sessions) targets = {""};  // a session's own tool has its name
   const std::string target = named(targets, "target", " target of each row");
   return fmt::format("of the{}, in the frame of the instrument{}", target.empty() ? " tool" : target,
                      named(sessions, "in the session", " in the session of each row"));

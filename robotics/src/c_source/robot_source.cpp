@@ -208,10 +208,13 @@ std::string header(const Robot& robot, const std::string& name) {
   };
   // A name may hold what ends a comment.
   std::string frames = fmt::format("   Positions are of the{}, in mm, in the frame of the instrument{};\n",
-                                   robot.chain.target.empty() ? " tool" : named(robot.chain.target, "target"),
+                                   robot.chain.target.empty() || robot.chain.target == robot.chain.session
+                                       ? " tool"
+                                       : named(robot.chain.target, "target"),
                                    named(robot.chain.session, "in the session"));
   for (std::size_t at = frames.find("*/"); at != std::string::npos; at = frames.find("*/")) frames.erase(at, 1);
-  return text + frames + with_name(R"(   rotations are nine numbers, row by row. */
+  return text + frames +
+         with_name(R"(   rotations are nine numbers, row by row. */
 #ifndef @_ROBOT_H
 #define @_ROBOT_H
 
@@ -223,7 +226,7 @@ double @_step(const double *conditions, const double *position, const double *ro
 
 #endif
 )",
-                          name);
+                   name);
 }
 
 }  // namespace

@@ -121,7 +121,8 @@ Robot started(Robot robot, const Measurements& measurements, bool base_is_known,
   }
   if (measurements.poses.observations.empty()) return robot;
   const Measurements distances = of_reading(measurements, Reading::distance);
-  if (distances.count() > 0 && base_is_free && points.count() == 0) robot = with_base_by_distances(std::move(robot), distances);
+  if (distances.count() > 0 && base_is_free && points.count() == 0)
+    robot = with_base_by_distances(std::move(robot), distances);
   const Measurements turns = of_reading(measurements, Reading::orientation);
   if (turns.count() > 0 && is_free(reasons, coordinates_of_frame + 3, 3)) {
     robot = with_closed_form_orientation(std::move(robot), turns);

@@ -297,8 +297,9 @@ std::optional<Suspicion> mistake_of_positions(const Robot& robot, const Measurem
 }  // namespace
 
 std::optional<Suspicion> likely_mistake(const Robot& robot, const Measurements& measurements) {
-  const std::optional<Suspicion> of_positions = mistake_of_positions(robot, measurements);
-  return of_positions ? of_positions : likely_orientation_mistake(robot, measurements);
+  if (const std::optional<Suspicion> of_positions = mistake_of_positions(robot, measurements)) return of_positions;
+  const std::optional<OrientationMistake> turned = likely_orientation_mistake(robot, measurements);
+  return turned ? std::optional(Suspicion{turned->name, turned->sentence}) : std::nullopt;
 }
 
 }  // namespace llmt::robotics

@@ -61,7 +61,7 @@ std::vector<Writing> other_readings(const Orientation& written, const std::strin
 
 }  // namespace
 
-std::optional<Suspicion> likely_orientation_mistake(const Robot& robot, const Measurements& measurements) {
+std::optional<OrientationMistake> likely_orientation_mistake(const Robot& robot, const Measurements& measurements) {
   constexpr std::size_t fewest = 10;
   constexpr double far_better = 0.1;
   constexpr double largest = 3.0 / degrees;
@@ -83,15 +83,16 @@ std::optional<Suspicion> likely_orientation_mistake(const Robot& robot, const Me
   const Orientation written = select(measurements, rows).orientation;
   const std::string& convention = written.convention.empty() ? robot.chain.orientation : written.convention;
   const double as_read = differences(rotations_of(written, convention));
-  std::optional<Suspicion> best;
+  std::optional<OrientationMistake> best;
   double least = std::min(largest, far_better * as_read);
   for (const Writing& other : other_readings(written, convention)) {
     const double scatter = differences(other.rotations);
     if (!(scatter < least)) continue;
     least = scatter;
-    best = Suspicion{other.name, fmt::format("most likely {}: orientations would then differ from the described robot's "
-                                             "by {:.3g} deg instead of {:.3g} deg",
-                                             other.words, scatter * degrees, as_read * degrees)};
+    best = OrientationMistake{other.name,
+                              fmt::format("most likely {}: orientations would then differ from the described robot's "
+                                          "by {:.3g} deg instead of {:.3g} deg",
+                                          other.words, scatter * degrees, as_read * degrees)};
   }
   return best;
 }

@@ -20,11 +20,11 @@ std::optional<std::string> payload_to_state(const Robots& robots, const PoseSpli
                                             const DiscoveryOptions& options) {
   constexpr double material = 0.05;
   const Robot& improved = robots.improved.robot;
-  const bool is_stated =
-      improved.chain.payload.mass_kg > 0.0 || split.samples.poses.covariates.contains("payload_kg");
+  const bool is_stated = improved.chain.payload.mass_kg > 0.0 || split.samples.poses.covariates.contains("payload_kg");
   const auto bends = [](const Effect& own) { return effect_type(own.type).scales_with_mass; };
   const auto is_payload = [](const Effect& own) { return own.type == "payload_error"; };
-  if (is_stated || split.test.count() < 3 || !has_effect(improved, bends) || has_effect(improved, is_payload)) return {};
+  if (is_stated || split.test.count() < 3 || !has_effect(improved, bends) || has_effect(improved, is_payload))
+    return {};
   Robot loaded = improved;
   loaded.effects.push_back({"payload_error", "", {0.0, 0.0, 0.0, 0.0}});
   const Measurements kept = without_rows(split.samples, found.investigation.verdict.outliers);

@@ -79,7 +79,8 @@ Header::Header(const Csv& csv, const Robot& robot, const std::vector<std::string
   }
   const bool has_sockets = words_.contains("socket");
   if (words_.contains("from") && !(has_sockets && has("distance"))) {
-    refuse("a column from names the socket that a length is measured from: it needs the columns socket and distance_mm");
+    refuse(
+        "a column from names the socket that a length is measured from: it needs the columns socket and distance_mm");
   }
   if (has_sockets && has("distance") && !words_.contains("from")) {
     refuse(
@@ -339,21 +340,6 @@ std::string Header::sequence_column() const {
     const auto found = covariates_.find(name);
     if (found != covariates_.end()) return found->second;
   }
-  return {};
-}
-
-std::string Header::lack_of_orientation() const {
-  const auto count = [&](const std::vector<std::string>& names) {
-    return std::ranges::count_if(names, [&](const std::string& name) { return quantities_.contains(name); });
-  };
-  const std::vector<std::string> angles = {"rx", "ry", "rz"};
-  const std::vector<std::string> quaternion = {"qw", "qx", "qy", "qz"};
-  for (const auto& names : {angles, quaternion}) {
-    if (count(names) == 0 || count(names) == std::ssize(names)) continue;
-    const auto lacking = std::ranges::find_if_not(names, [&](const auto& name) { return quantities_.contains(name); });
-    return fmt::format("an orientation needs {}, there is no column {}", fmt::join(names, ", "), *lacking);
-  }
-  if (count(angles) > 0 && count(quaternion) > 0) return "there are angles and a quaternion, the angles are used";
   return {};
 }
 

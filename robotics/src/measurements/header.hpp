@@ -51,8 +51,8 @@ class Header {
   /// The column of the file that says in which sequence rows were read: order, or else time_s; empty if there is none.
   std::string sequence_column() const;
 
-  /// Names in the column `target`, `session`, `socket`, `plane`, `sphere`, `reference` or `from`, row by row; empty if there
-  /// is none.
+  /// Names in the column `target`, `session`, `socket`, `plane`, `sphere`, `reference` or `from`, row by row; empty if
+  /// there is none.
   std::vector<std::string> words(const std::string& column) const;
 
   const std::vector<std::string>& unused() const { return unused_; }

@@ -54,4 +54,19 @@ std::vector<Finding> Header::hints() const {
   return hints;
 }
 
+std::string Header::lack_of_orientation() const {
+  const auto count = [&](const std::vector<std::string>& names) {
+    return std::ranges::count_if(names, [&](const std::string& name) { return quantities_.contains(name); });
+  };
+  const std::vector<std::string> angles = {"rx", "ry", "rz"};
+  const std::vector<std::string> quaternion = {"qw", "qx", "qy", "qz"};
+  for (const auto& names : {angles, quaternion}) {
+    if (count(names) == 0 || count(names) == std::ssize(names)) continue;
+    const auto lacking = std::ranges::find_if_not(names, [&](const auto& name) { return quantities_.contains(name); });
+    return fmt::format("an orientation needs {}, there is no column {}", fmt::join(names, ", "), *lacking);
+  }
+  if (count(angles) > 0 && count(quaternion) > 0) return "there are angles and a quaternion, the angles are used";
+  return {};
+}
+
 }  // namespace llmt::robotics

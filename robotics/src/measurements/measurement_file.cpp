@@ -92,8 +92,10 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
   for (const char* column : {"socket", "plane", "sphere"}) refuse_same_but_for_dots(csv, header.words(column), column);
   const bool has_targets = !targets.empty();
   const std::vector<Eigen::Index> stands = stands_of(rows, sessions, has_targets);
-  const std::map<std::string, std::vector<std::string>> features = {
-      {"socket", header.words("socket")}, {"plane", header.words("plane")}, {"sphere", header.words("sphere")}, {"from", header.words("from")}};
+  const std::map<std::string, std::vector<std::string>> features = {{"socket", header.words("socket")},
+                                                                    {"plane", header.words("plane")},
+                                                                    {"sphere", header.words("sphere")},
+                                                                    {"from", header.words("from")}};
   FrameNames base_of(robot.chain.bases, robot.chain.session);
   FrameNames tool_of(robot.chain.tools, robot.chain.target);
   std::vector<Observation>& observations = measurements.poses.observations;

@@ -151,7 +151,8 @@ std::vector<double> path_of(const Poses& poses) {
   };
   if (steps.empty() || !(middle(steps) <= near * middle(others))) return {};
   std::vector<double> labels(n);
-  for (Eigen::Index i = 0; i < n; ++i) labels[i] = std::floor(stretches * static_cast<double>(i) / static_cast<double>(n));
+  for (Eigen::Index i = 0; i < n; ++i)
+    labels[i] = std::floor(stretches * static_cast<double>(i) / static_cast<double>(n));
   // Repeats of a pose, and readings of a stand, stay together.
   for (Eigen::Index i = 1; i < n; ++i) {
     if (poses.joints.row(i) == poses.joints.row(i - 1)) labels[i] = labels[i - 1];

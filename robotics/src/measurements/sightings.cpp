@@ -64,7 +64,9 @@ std::vector<Sighting> lengths_of(const Csv& csv, const Header& header, const Wor
   if (from.empty()) return seen;
   const Eigen::VectorXd lengths = header.distances_mm();
   const Words spheres = header.words("sphere");
-  const auto has = [](const Words& words, const std::string& name) { return std::ranges::find(words, name) != words.end(); };
+  const auto has = [](const Words& words, const std::string& name) {
+    return std::ranges::find(words, name) != words.end();
+  };
   for (Eigen::Index row = 0; row < csv.rows(); ++row) {
     if (from[row].empty() && std::isnan(lengths(row))) continue;
     if (from[row].empty()) csv.refuse(row, "from", "the socket is missing that the distance is measured from");

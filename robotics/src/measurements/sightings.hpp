@@ -17,7 +17,7 @@ struct Sighting {
   std::string target;
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
   std::string feature = {};  ///< "socket", "plane", "sphere" or "known sphere": `value` is then what is read of it
-  bool is_length = false;    ///< `value` is the certified length from the feature in the column `from` to the tool point
+  bool is_length = false;  ///< `value` is the certified length from the feature in the column `from` to the tool point
 };
 
 /// All sightings, by row; of `measurements` sets `measured` and adds warnings. Throws std::runtime_error, naming file

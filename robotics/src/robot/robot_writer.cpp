@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "llmt/robotics/robot_file.hpp"
+#include "robot/record_file.hpp"
 #include "yaml/yaml_writer.hpp"
 
 namespace llmt::robotics {
@@ -86,52 +87,6 @@ void write_identified(YamlWriter& out, const Robot& robot) {
     out.end_map();
   }
   out.end_list();
-}
-
-void write_ranges(YamlWriter& out, const Chain& chain, const CalibrationRecord& record) {
-  out.key("joint_ranges").begin_list(YAML::Block);
-  for (std::size_t j = 0; j < record.joint_ranges.size(); ++j) {
-    const Joint& joint = chain.joints[j];
-    out.begin_map().word("joint", joint.name).numbers("range_" + limit_unit(joint), record.joint_ranges[j]).end_map();
-  }
-  out.end_list();
-}
-
-void write_conditions(YamlWriter& out, const CalibrationRecord& record) {
-  out.key("condition_ranges").begin_map(YAML::Flow);
-  for (const auto& [name, range] : record.condition_ranges) out.numbers(name, range);
-  out.end_map();
-}
-
-void write_provenance(YamlWriter& out, const Provenance& made) {
-  out.key("made_from").begin_map(YAML::Block).word("program", made.program).word("date", made.date);
-  out.key("files").begin_list(YAML::Block);
-  for (const SourceFile& source : made.sources) {
-    out.begin_map().word("role", source.role).word("name", source.name).word("sha256", source.sha256).end_map();
-  }
-  out.end_list();
-  if (!made.options.empty()) out.key("options").words(made.options);
-  if (!made.instrument.empty()) out.word("instrument", made.instrument);
-  if (!made.serial_number.empty()) out.word("serial_number", made.serial_number);
-  out.end_map();
-}
-
-void write_record(YamlWriter& out, const Chain& chain, const CalibrationRecord& record) {
-  out.key("calibration").begin_map(YAML::Block);
-  out.number("poses", static_cast<double>(record.poses))
-      .number("coordinates", static_cast<double>(record.coordinates))
-      .number("noise_mm", record.noise_mm);
-  if (record.held_out_mm) out.number("held_out_mm", *record.held_out_mm);
-  if (record.held_out_sd_mm) out.number("held_out_sd_mm", *record.held_out_sd_mm);
-  if (record.made_from) write_provenance(out, *record.made_from);
-  if (!record.joint_ranges.empty()) write_ranges(out, chain, record);
-  if (!record.condition_ranges.empty()) write_conditions(out, record);
-  std::vector<double> below;
-  for (Eigen::Index i = 0; i < record.correlations.rows(); ++i) {
-    for (Eigen::Index k = 0; k < i; ++k) below.push_back(record.correlations(i, k));
-  }
-  if (!below.empty()) out.numbers("correlations", below);
-  out.end_map();
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ std::string touched_by(const Measurements& touched, Eigen::Index row) {
 // A length between two sockets, stated in every row of one of them, is one kind of reading more.
 TEST(Sockets, ALengthBetweenThemShowsTheScale) {
   Robot truth = perturbed(ur_like(), 0.5, 0.05, 3);
-  truth.chain.joints[1].a_mm = ur_like().chain.joints[1].a_mm + 2.0;  // the longest length is wrong, too
+  truth.chain.joints[1].a_mm = ur_like().chain.joints[1].a_mm - 2.0;  // the longest length is wrong, too
   constexpr double sigma_mm = 0.02;
   const Measurements touched = in_sockets(truth, 60, sigma_mm);
   std::string with_length = "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,socket,from,distance_mm\n";

@@ -131,7 +131,8 @@ Eigen::Index drive_count(const Chain& chain);
 std::size_t joint_index(const Chain& chain, std::string_view name);
 
 /// The chain as it stands in that session and with that target: their frames become `base` and `tool`, `bases` and
-/// `tools` are empty. Empty names stand for the chain's own. Throws std::invalid_argument, with the names that it knows, for another one.
+/// `tools` are empty. Empty names stand for the chain's own. Throws std::invalid_argument, with the names that it
+/// knows, for another one.
 Chain in_session(Chain chain, const std::string& session, const std::string& target);
 
 /// Whether a parameter of that name belongs to a base or a tool.

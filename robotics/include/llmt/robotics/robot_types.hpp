@@ -35,12 +35,12 @@ struct SourceFile {
 
 /// Where a calibrated description comes from, for those who audit it. Nothing is computed from it.
 struct Provenance {
-  std::string program;              ///< with its version
-  std::string date;                 ///< in UTC, as 2026-05-31
+  std::string program;  ///< with its version
+  std::string date;     ///< in UTC, as 2026-05-31
   std::vector<SourceFile> sources;
-  std::vector<std::string> options; ///< of the command line, as they were given
-  std::string instrument = {};      ///< as the user states it; empty: nobody did
-  std::string serial_number = {};   ///< of the robot, likewise
+  std::vector<std::string> options;  ///< of the command line, as they were given
+  std::string instrument = {};       ///< as the user states it; empty: nobody did
+  std::string serial_number = {};    ///< of the robot, likewise
 };
 
 /// How good a calibration was, for whoever asks later whether it still holds.
