@@ -81,7 +81,26 @@ def test_found_effects_are_those_of_the_arm_that_was_measured(found):
     assert found.gap["after_mm"] < 0.1 * found.gap["before_mm"]
 
 
+def test_a_limit_is_passed_or_failed(arm, measured):
+    assert robotics.calibrate(arm, measured, folds=2, limit_mm=50.0).verdict == "pass"
+    assert robotics.calibrate(arm, measured, folds=2, limit_mm=1e-4).verdict == "fail"
+    assert robotics.calibrate(arm, measured, folds=0, limit_mm=1.0).verdict == "not evaluated"
+    with pytest.raises(ValueError, match="limit_mm"):
+        robotics.calibrate(arm, measured, limit_mm=-1.0)
+
+
+def test_geometry_for_a_controller_is_fitted_alone(found, arm):
+    with pytest.warns(robotics.RobotWarning, match="Without the rest the tool is 0.*mm off on average"):
+        deltas = robotics.export(found.robot, "deltas", nominal=arm)
+    with pytest.warns(robotics.RobotWarning, match="the zeros of the joints alone"):
+        zeros = robotics.export(found.robot, "deltas", nominal=arm, zeros=True)
+    assert deltas != zeros and deltas.startswith("joint,delta_theta_deg")
+    with pytest.raises(ValueError, match='not calibrated with the session "x"'):
+        robotics.export(found.robot, "kinematics", session="x")
+
+
 def test_calibrate_is_that_of_the_command(calibrated):
+    assert calibrated.verdict is None
     expected = json.loads(command("calibrate", "arm.yaml", "arm_measured.csv", "--folds", 2, "--json"))
     assert without_files(calibrated.to_dict()) == without_files(expected)
     assert calibrated.to_dict()["data"] == "measured"

@@ -19,6 +19,7 @@ bool has_effect(const Robot& robot, const auto& is_meant) {
 std::optional<std::string> payload_to_state(const Robots& robots, const PoseSplit& split, const Findings& found,
                                             const DiscoveryOptions& options) {
   constexpr double material = 0.05;
+  constexpr double start_kg = 1.0;
   const Robot& improved = robots.improved.robot;
   const bool is_stated = improved.chain.payload.mass_kg > 0.0 || split.samples.poses.covariates.contains("payload_kg");
   const auto bends = [](const Effect& own) { return effect_type(own.type).scales_with_mass; };
@@ -26,6 +27,7 @@ std::optional<std::string> payload_to_state(const Robots& robots, const PoseSpli
   if (is_stated || split.test.count() < 3 || !has_effect(improved, bends) || has_effect(improved, is_payload))
     return {};
   Robot loaded = improved;
+  loaded.chain.payload.mass_kg = start_kg;  // the effect changes a payload that is there
   loaded.effects.push_back({"payload_error", "", {0.0, 0.0, 0.0, 0.0}});
   const Measurements kept = without_rows(split.samples, found.investigation.verdict.outliers);
   const Calibration fitted = calibrate(loaded, kept, options.calibration);
@@ -33,7 +35,7 @@ std::optional<std::string> payload_to_state(const Robots& robots, const PoseSpli
   const Eigen::VectorXd with =
       distances(positions({fitted.robot, robots.improved.correction}, split.test.poses), split.test);
   const PairedDifference gain = paired_difference(without, with);
-  const double mass = fitted.robot.effects.back().values[0];
+  const double mass = start_kg + fitted.robot.effects.back().values[0];
   if (!(mass > 0.0) || !gain.is_beyond_chance() || gain.mean < material * without.mean()) return {};
   return fmt::format(
       "State the payload (payload of the description, or a column payload_kg): with {:.3g} kg the poses set aside "

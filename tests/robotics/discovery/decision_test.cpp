@@ -22,6 +22,7 @@ const std::map<std::string, Reason> against_names = {{"undetermined", Reason::un
                                                      {"still joint", Reason::still_joint},
                                                      {"both signs", Reason::both_signs},
                                                      {"refits", Reason::refits},
+                                                     {"arm instead", Reason::arm_instead},
                                                      {"part of the unknown", Reason::part_of_unknown},
                                                      {"error of a larger effect", Reason::error_of_larger},
                                                      {"instrument residuals", Reason::instrument_residuals}};

@@ -1,6 +1,7 @@
 // Names that hold: in refits, with one sign, at joints that move, and of a torque that is known.
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <limits>
 
 #include "discovery/judges/judges.hpp"
@@ -115,6 +116,47 @@ TEST(NamesHold, AStatedPayloadWithoutMassesMakesNoSize) {
     for (const FoundEffect& one : found.effects) EXPECT_NE(one.effect.type, "joint_compliance") << seed;
     EXPECT_LT(found.held_out.after.mean, 0.5 * found.held_out.before.mean) << seed;
   }
+}
+
+// What is searched for by default, but for one type.
+std::vector<EffectType> catalogue_without(const std::string& type) {
+  std::vector<EffectType> types = effect_types();
+  std::erase_if(types, [&](const EffectType& own) { return own.name == type; });
+  return types;
+}
+
+TEST(NamesHold, APayloadThatNobodyStatedIsAskedFor) {
+  Robot real = arm_with_compliance(2e-6);
+  real.effects.push_back({"joint_compliance", "joint3", {3e-6}, {}});
+  Robot described = real;
+  described.effects.clear();
+  real.chain.payload.mass_kg = 25.0;
+  Measurements seen = simulate(real, {.poses = 120, .noise_um = 20.0, .seed = 5});
+  DiscoveryOptions options;
+  options.catalogue = catalogue_without("payload_error");  // which would be named itself
+  const Discovery found = discover(described, seen, {}, options);
+  ASSERT_EQ(found.could_state.size(), 1U);
+  EXPECT_EQ(found.could_state[0].substr(0, 18), "State the payload ") << found.could_state[0];
+  double mass = 0.0;
+  ASSERT_EQ(std::sscanf(found.could_state[0].c_str() + found.could_state[0].find("with "), "with %lf kg", &mass), 1);
+  EXPECT_NEAR(mass, 25.0, 5.0) << found.could_state[0];
+  seen.poses.covariates["payload_kg"] = Eigen::VectorXd::Constant(seen.count(), 25.0);
+  EXPECT_TRUE(discover(described, seen, {}, options).could_state.empty());
+}
+
+// The instrument's range is off by 1 mm: no error of the arm explains that, so the name stands.
+TEST(NamesHold, AnErrorOfTheInstrumentHasNoRivalOfTheArmWhereItIsReal) {
+  Robot real = arm_with_compliance(1e-7);
+  real.chain.base.xyz_mm = {2500.0, 800.0, -300.0};
+  Robot described = real;
+  described.effects.clear();
+  real.effects = {{"instrument_range", "", {1.0}, {}}};
+  const Discovery found = discover(described, simulate(real, {.poses = 120, .noise_um = 20.0, .seed = 5}), {}, {});
+  const auto own =
+      std::ranges::find_if(found.effects, [](const FoundEffect& one) { return one.effect.type == "instrument_range"; });
+  ASSERT_NE(own, found.effects.end());
+  EXPECT_TRUE(own->confirmed);
+  EXPECT_NEAR(own->parameters[0].value, 1.0, 0.2);
 }
 
 }  // namespace

@@ -100,6 +100,7 @@ Json discovery_json(const robotics::Discovery& found) {
                {"unknown_all", patterns},
                {"more", patterns_json(found.more)},
                {"beyond_plausible", beyond_json(found)},
+               {"could_state", found.could_state},
                {"maps", found.maps.size()},
                {"gap", gap_json(found)},
                {"outliers", found.outliers},
