@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 #include <tinyxml.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <stdexcept>
 
 #include "kinematics/units.hpp"
@@ -84,7 +88,16 @@ void set_origin(TiXmlElement& robot, const std::string& joint, const Eigen::Isom
 
 }  // namespace
 
-bool is_urdf(const std::string& path) { return path.ends_with(".urdf"); }
+bool is_urdf(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".urdf") return true;
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none)) return false;  // a pipe would lose what is read of it
+  char first = '\0';
+  std::ifstream(path) >> first;
+  return first == '<';
+}
 
 Chain parse_urdf(const std::string& text, const std::string& name, const UrdfLinks& links) {
   const UrdfArm arm = urdf_arm(text, name, links);

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "llmt/files.hpp"
 #include "llmt/robotics/robot.hpp"
+#include "llmt/robotics/robot_file.hpp"
 #include "robotics/urdf/random_urdf.hpp"
 
 namespace llmt::robotics {
@@ -164,6 +166,22 @@ TEST(Urdf, CentresOfMassAreThoseOfAllThatAJointCarries) {
       EXPECT_LT((skeleton.body_centre[j] - moment[j] / mass[j]).norm(), 1e-8);
     }
   }
+}
+
+// Exporters write `.URDF`, and many keep `robot.xml`.
+TEST(Urdf, IsKnownByItsEndingInAnyCaseOrByItsContent) {
+  Random random(4);
+  const auto joints = random_joints(random);
+  const std::string folder = ::testing::TempDir();
+  for (const char* name : {"arm.URDF", "arm.xml", "arm.urdf"}) {
+    const std::string path = folder + name;
+    write_file(path, text_of(joints));
+    EXPECT_TRUE(is_urdf(path)) << name;
+    EXPECT_EQ(read_robot(path).chain.joints.size(), parse_urdf(text_of(joints), "r.urdf").joints.size()) << name;
+  }
+  write_file(folder + "arm.yaml", to_yaml(Robot{.chain = parse_urdf(text_of(joints), "r.urdf")}));
+  EXPECT_FALSE(is_urdf(folder + "arm.yaml"));
+  EXPECT_FALSE(is_urdf(folder + "nothing there"));
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 
 namespace llmt::robotics {
 
-/// Whether the name of a file ends in ".urdf".
+/// Whether the name of a file ends in ".urdf", in any case, or a file of that name begins as XML does, with "<".
 bool is_urdf(const std::string& path);
 
 /// The arm between two links of a URDF as a chain in modified Denavit-Hartenberg convention, exact to rounding: any
