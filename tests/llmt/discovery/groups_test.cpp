@@ -39,7 +39,8 @@ struct Table {
   }
 
   Missing grouped() const {
-    const TermModel model(simulation, inputs, {"y"}, terms);
+    const Recording recording(inputs);
+    const TermModel model(simulation, recording, {"y"}, terms);
     Samples samples;
     for (Eigen::Index i = 0; i < n; ++i) samples.add(std::span(&i, 1));
     const TermData data{.samples = samples,

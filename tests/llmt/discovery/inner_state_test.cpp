@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "discovery/terms/derivatives.hpp"
+#include "discovery/recording/derivatives.hpp"
 #include "discovery/terms/resonance.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"

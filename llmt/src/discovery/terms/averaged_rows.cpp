@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "discovery/terms/row_split.hpp"
+#include "discovery/recording/row_split.hpp"
 #include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
@@ -32,24 +32,27 @@ Eigen::MatrixXd spread_out(const Eigen::MatrixXd& of_blocks, const Samples& bloc
 
 }  // namespace
 
-std::optional<AveragedRows> averaged(const Inputs& inputs, const MeasuredOutputs& measured,
+std::optional<AveragedRows> averaged(const Recording& recording, const MeasuredOutputs& measured,
                                      const MissingOptions& options, Eigen::Index most) {
+  const Inputs& inputs = recording.inputs();
   const Eigen::Index n = inputs.values.rows();
-  if (inputs.instants.size() == 0 || inputs.cutoff > 0.0 || n < 2 * most) return std::nullopt;
+  if (!recording.is_in_time() || recording.is_filtered() || n < 2 * most) return std::nullopt;
   constexpr Eigen::Index share_of_a_sample = 12;
-  const Eigen::Index length = std::min(n / most, bearable_block(inputs, options) / share_of_a_sample);
+  const Eigen::Index length = std::min(n / most, bearable_block(recording, options) / share_of_a_sample);
   if (length < 2) return std::nullopt;
-  AveragedRows few{inputs, measured, blocks_in_time(inputs, length)};
-  few.inputs.values = means(inputs.values, few.blocks);
-  few.inputs.instants = means(inputs.instants, few.blocks);
-  few.inputs.noise /= std::sqrt(static_cast<double>(length));
-  few.measured.values = means(measured.values, few.blocks);
-  few.measured.noise /= std::sqrt(static_cast<double>(length));
-  few.inputs.runs.clear();
-  for (Eigen::Index b = 0; b < few.blocks.size() && !inputs.runs.empty(); ++b) {
-    few.inputs.runs.push_back(inputs.runs[few.blocks.rows_of(b).front()]);
+  Samples blocks = blocks_in_time(recording, length);
+  Inputs of_means = inputs;
+  of_means.values = means(inputs.values, blocks);
+  of_means.instants = means(inputs.instants, blocks);
+  of_means.noise /= std::sqrt(static_cast<double>(length));
+  of_means.runs.clear();
+  for (Eigen::Index b = 0; b < blocks.size() && !inputs.runs.empty(); ++b) {
+    of_means.runs.push_back(inputs.runs[blocks.rows_of(b).front()]);
   }
-  return few;
+  MeasuredOutputs outputs = measured;
+  outputs.values = means(measured.values, blocks);
+  outputs.noise /= std::sqrt(static_cast<double>(length));
+  return AveragedRows{Recording(std::move(of_means)), std::move(outputs), std::move(blocks)};
 }
 
 Simulation averaged(const Simulation& simulation, const Inputs& inputs, const Samples& blocks) {
@@ -61,14 +64,13 @@ Simulation averaged(const Simulation& simulation, const Inputs& inputs, const Sa
 }
 
 Missing of_all_rows(Missing missing, const AveragedRows& few, const Simulation& simulation,
-                    const std::vector<ModelTerm>& terms, const Inputs& inputs) {
-  const Eigen::Index n = inputs.values.rows();
+                    const std::vector<ModelTerm>& terms, const Recording& recording) {
+  const Eigen::MatrixXd& inputs = recording.inputs().values;
+  const Eigen::Index n = inputs.rows();
   const Samples& blocks = few.blocks;
-  Eigen::VectorXd nominal(std::ssize(simulation.parameters));
-  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) nominal(k) = simulation.parameters[k].value;
-  const Eigen::MatrixXd simulated = simulation.predict(inputs.values, nominal);
+  const Eigen::MatrixXd simulated = simulation.predict(inputs, values_of(simulation.parameters));
   missing.before = simulated + spread_out(missing.before - means(simulated, blocks), blocks, n);
-  missing.corrected = with_found_terms(simulation, missing, terms, inputs);
+  missing.corrected = with_found_terms(simulation, missing, terms, recording);
   if (missing.change_by_smoothing.size() > 0) {
     missing.change_by_smoothing = spread_out(missing.change_by_smoothing, blocks, n);
   }

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <utility>
 
-#include "discovery/terms/row_split.hpp"
+#include "discovery/recording/row_split.hpp"
 
 namespace llmt::discovery {
 
-ColumnCache::ColumnCache(const Inputs& inputs) : places_(inputs.values.rows(), -1) {
+ColumnCache::ColumnCache(const Recording& recording) : places_(recording.inputs().values.rows(), -1) {
   MissingOptions nothing_aside;
   nothing_aside.held_out_share = 0.0;
-  all_ = split_in_time(inputs, nothing_aside, 1).searched;
+  all_ = split_in_time(recording, nothing_aside, 1).searched;
   for (Eigen::Index i = 0; i < all_.size(); ++i) places_[all_.rows()[i]] = i;
 }
 

@@ -8,7 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "discovery/terms/samples.hpp"
+#include "discovery/recording/recording.hpp"
+#include "discovery/recording/samples.hpp"
 #include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
@@ -17,8 +18,8 @@ namespace llmt::discovery {
 /// computed at all rows and filtered once, at all rows that may be samples.
 class ColumnCache {
  public:
-  /// Inputs::cutoff is above 0.
-  explicit ColumnCache(const Inputs& inputs);
+  /// Of filtered rows.
+  explicit ColumnCache(const Recording& recording);
 
   static bool holds(const ModelTerm& term);
 

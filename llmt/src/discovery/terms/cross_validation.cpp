@@ -5,20 +5,24 @@
 #include <limits>
 #include <utility>
 
+#include "discovery/recording/row_filter.hpp"
+#include "discovery/recording/row_split.hpp"
 #include "discovery/terms/outliers.hpp"
-#include "discovery/terms/row_filter.hpp"
-#include "discovery/terms/row_split.hpp"
 #include "discovery/terms/term_question.hpp"
 
 namespace llmt::discovery {
 
-CrossValidation::CrossValidation(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                                 const std::vector<ModelTerm>& terms, const SearchedRows& rows,
-                                 const MissingOptions& options)
-    : simulation_(&simulation), inputs_(&inputs), terms_(&terms), outputs_(measured.names), columns_(rows.columns) {
+CrossValidation::CrossValidation(const Simulation& simulation, const Recording& recording,
+                                 const MeasuredOutputs& measured, const std::vector<ModelTerm>& terms,
+                                 const SearchedRows& rows, const MissingOptions& options)
+    : simulation_(&simulation),
+      recording_(&recording),
+      terms_(&terms),
+      outputs_(measured.names),
+      columns_(rows.columns) {
   MissingOptions nothing_aside = options;
   nothing_aside.held_out_share = 0.0;
-  const RowSplit split = split_of(inputs, rows, nothing_aside);
+  const RowSplit split = split_of(recording, rows, nothing_aside);
   data_ = {.samples = split.searched,
            .measured = means_of_filtered(measured.values, split.searched),
            .sigma = Eigen::VectorXd::Ones(measured.values.cols()),
@@ -30,14 +34,10 @@ Eigen::MatrixXd CrossValidation::errors(const Missing& answer, const Eigen::Matr
   constexpr Eigen::Index stretches = 2 * folds;
   Simulation simulation = *simulation_;
   simulation.parameters = answer.parameters;
-  TermModel model(simulation, *inputs_, outputs_, *terms_);
+  TermModel model(simulation, *recording_, outputs_, *terms_);
   model.share(columns_, 0);
-  Eigen::VectorXd start(std::ssize(answer.parameters));
-  for (std::size_t k = 0; k < answer.parameters.size(); ++k) start(k) = answer.parameters[k].value;
-  std::vector<PlacedTerm> placed;
-  for (const FoundTerm& found : answer.found) {
-    placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
-  }
+  const Eigen::VectorXd start = values_of(answer.parameters);
+  const std::vector<PlacedTerm> placed = placed_terms(answer);
   TermData data = data_;
   if (weights.size() > 0) data.weights = std::make_shared<const Eigen::MatrixXd>(weights);
   for (std::size_t o = 0; o < answer.gaps.size(); ++o) {

@@ -17,7 +17,7 @@ namespace llmt::discovery {
 class CrossValidation {
  public:
   /// Keeps references.
-  CrossValidation(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+  CrossValidation(const Simulation& simulation, const Recording& recording, const MeasuredOutputs& measured,
                   const std::vector<ModelTerm>& terms, const SearchedRows& rows, const MissingOptions& options);
 
   /// samples x d: measured minus predicted, times roots of `weights` of rows (n x d, or empty).
@@ -25,7 +25,7 @@ class CrossValidation {
 
  private:
   const Simulation* simulation_;
-  const Inputs* inputs_;
+  const Recording* recording_;
   const std::vector<ModelTerm>* terms_;
   std::vector<std::string> outputs_;
   std::shared_ptr<ColumnCache> columns_;

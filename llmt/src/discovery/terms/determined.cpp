@@ -9,7 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "discovery/terms/refuse.hpp"
+#include "discovery/recording/refuse.hpp"
+#include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -84,9 +85,7 @@ void refuse_determined(const Simulation& simulation, const Inputs& inputs, const
       std::erase(fewer, j);
       if (affine(inputs.values, fewer, output).is_exact) chosen = fewer;
     }
-    Eigen::VectorXd start(std::ssize(simulation.parameters));
-    for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
-    const Eigen::MatrixXd simulated = simulation.predict(inputs.values, start);
+    const Eigen::MatrixXd simulated = simulation.predict(inputs.values, values_of(simulation.parameters));
     // What has the wrong shape is refused by the search.
     if (simulated.rows() != output.size() || simulated.cols() != measured.values.cols()) return;
     if (!simulated.col(o).allFinite() || affine(inputs.values, chosen, simulated.col(o)).is_exact) continue;

@@ -6,41 +6,36 @@
 #include <algorithm>
 #include <cmath>
 
+#include "discovery/recording/apart.hpp"
 #include "discovery/terms/decision.hpp"
-#include "discovery/terms/standstill.hpp"
-#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 
-ErrorsOfInputs errors_of_inputs(const TermModel& model, const Inputs& inputs, const MeasuredOutputs& measured,
-                                const Eigen::VectorXd& start, RowSplit& split) {
+ErrorsOfInputs errors_of_inputs(const TermModel& model, const MeasuredOutputs& measured, const Eigen::VectorXd& start,
+                                RowSplit& split) {
   ErrorsOfInputs errors;
+  const Recording& recording = model.recording();
+  const Inputs& inputs = recording.inputs();
   if (inputs.instants.size() == 0 && inputs.noise.size() == 0) return errors;
   const Eigen::MatrixXd simulated = model.simulated(start);
   if (!simulated.allFinite()) return errors;
-  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
-  const Eigen::MatrixXd covariance = covariance_of_errors(rows, inputs);
+  const Eigen::MatrixXd& covariance = recording.covariance();
   if (!(covariance.diagonal().array() > 0.0).any()) return errors;
-  if (inputs.instants.size() > 0 && inputs.cutoff == 0.0) {
+  const std::vector<Apart> unknown = rows_apart(ApartWhen::before_a_fit, {recording, measured, simulated});
+  if (!unknown.empty()) {
     std::vector<bool> apart(inputs.values.rows(), false);
-    for (const UnknownSign& found :
-         rows_of_unknown_sign(rows, inputs, covariance, measured.values - simulated, apart)) {
-      errors.notes.push_back(fmt::format(
-          "{} rows with |{}| < {:.3g} were set apart: the sign of {} is not known there, and values scatter {:.1f} "
-          "times as much as elsewhere",
-          found.rows, found.input, found.limit, found.input, found.roughness));
-    }
+    mark(unknown, apart);
+    tell(unknown, errors.notes);
     split = without_rows(split, apart);
   }
-  auto noise = std::make_unique<InputNoise>(model, inputs, simulated, covariance);
+  auto noise = std::make_unique<InputNoise>(model, simulated);
   std::vector<std::string> deviations;
   for (std::size_t j = 0; j < inputs.names.size(); ++j) {
     const double own = std::sqrt(covariance(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(j)));
     if (own > 0.0) deviations.push_back(fmt::format("{} {:.2g}", inputs.names[j], own));
   }
   const bool is_told = inputs.noise.size() > 0 && !inputs.noise.array().isNaN().any();
-  constexpr double enough = 0.9;
-  const bool is_described = noise->described().minCoeff() >= enough;
+  const bool is_described = noise->described().minCoeff() >= roughly_described;
   errors.notes.push_back(fmt::format(
       "errors of the inputs {} (standard deviations): {}; {}", is_told ? "as told" : "from neighbouring rows",
       fmt::join(deviations, ", "),

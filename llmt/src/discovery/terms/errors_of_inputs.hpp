@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "discovery/recording/row_split.hpp"
 #include "discovery/terms/input_noise.hpp"
-#include "discovery/terms/row_split.hpp"
 
 namespace llmt::discovery {
 
@@ -18,8 +18,8 @@ struct ErrorsOfInputs {
 };
 
 /// Takes rows out of the split at which the sign of an input is not known. `start`: values of the parameters.
-ErrorsOfInputs errors_of_inputs(const TermModel& model, const Inputs& inputs, const MeasuredOutputs& measured,
-                                const Eigen::VectorXd& start, RowSplit& split);
+ErrorsOfInputs errors_of_inputs(const TermModel& model, const MeasuredOutputs& measured, const Eigen::VectorXd& start,
+                                RowSplit& split);
 
 /// Corrects the estimates of the fit, and remembers those that cannot be corrected.
 void correct_estimates(ErrorsOfInputs& errors, const TermData& kept, TermFit& fit);

@@ -4,14 +4,14 @@
 #include <optional>
 #include <set>
 
+#include "discovery/recording/row_filter.hpp"
+#include "discovery/recording/row_split.hpp"
+#include "discovery/recording/standstill.hpp"
 #include "discovery/terms/errors_of_inputs.hpp"
 #include "discovery/terms/fitted_parameters.hpp"
 #include "discovery/terms/groups.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/outliers.hpp"
-#include "discovery/terms/row_filter.hpp"
-#include "discovery/terms/row_split.hpp"
-#include "discovery/terms/standstill.hpp"
 #include "discovery/terms/term_question.hpp"
 #include "discovery/terms/term_rounds.hpp"
 
@@ -75,28 +75,23 @@ std::optional<RowSplit> without_outliers(const TermModel& model, const MeasuredO
 
 }  // namespace
 
-void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+void fit_on_all_rows(const Simulation& simulation, const Recording& recording, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const SearchedRows& rows, const MissingOptions& options,
                      Missing& missing) {
   if (missing.held_out.empty() || missing.answer == Answer::failed_held_out) return;
   Simulation distinct = simulation;
   distinct.parameters = missing.parameters;
-  TermModel model(distinct, inputs, measured.names, terms);
+  TermModel model(distinct, recording, measured.names, terms);
   model.share(rows.columns, 0);
-  Eigen::VectorXd start(std::ssize(missing.parameters));
-  for (std::size_t k = 0; k < missing.parameters.size(); ++k) start(k) = missing.parameters[k].value;
+  const Eigen::VectorXd start = values_of(missing.parameters);
   MissingOptions nothing_aside = options;
   nothing_aside.held_out_share = 0.0;
-  const bool in_time = inputs.instants.size() > 0;
-  RowSplit split = split_of(inputs, rows, nothing_aside);
-  std::vector<PlacedTerm> placed;
-  for (const FoundTerm& found : missing.found) {
-    placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
-  }
+  RowSplit split = split_of(recording, rows, nothing_aside);
+  std::vector<PlacedTerm> placed = placed_terms(missing);
   const std::optional<RowSplit> fitting = without_outliers(model, measured, missing, start, placed, split);
   if (!fitting) return;
   split = *fitting;
-  ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
+  ErrorsOfInputs errors = errors_of_inputs(model, measured, start, split);
   TermData data{.samples = split.searched,
                 .measured = means_of_filtered(measured.values, split.searched),
                 .sigma = Eigen::VectorXd::Ones(measured.values.cols()),
@@ -111,12 +106,12 @@ void fit_on_all_rows(const Simulation& simulation, const Inputs& inputs, const M
   const TermFit alone = fit_terms(model, data, start, {});
   set_trial_errors(model, data, fit);
   const bool is_certain = missing.answer == Answer::named || missing.answer == Answer::indistinguishable;
-  if (in_time && is_certain) name_groups(model, data, fit, missing);
+  if (recording.is_in_time() && is_certain) name_groups(model, data, fit, missing);
   correct_estimates(errors, data, fit);
   for (std::size_t k = 0; k < missing.found.size(); ++k) set_estimates(fit.placed[k], fit.errors[k], missing.found[k]);
   move_parameters(fit, alone, options.search.false_alarm_rate, missing);
-  missing.before = as_measured(inputs, model.predict(alone.parameters, {}));
-  missing.corrected = as_measured(inputs, model.predict(fit.parameters, fit.placed));
+  missing.before = recording.as_measured(model.predict(alone.parameters, {}));
+  missing.corrected = recording.as_measured(model.predict(fit.parameters, fit.placed));
 }
 
 }  // namespace llmt::discovery

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <set>
 
-#include "discovery/terms/refuse.hpp"
+#include "discovery/recording/refuse.hpp"
 
 namespace llmt::discovery {
 namespace {

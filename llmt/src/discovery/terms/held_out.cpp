@@ -4,10 +4,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "discovery/terms/motion.hpp"
 #include "discovery/terms/outliers.hpp"
 #include "discovery/terms/term_question.hpp"
-#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -115,11 +113,10 @@ void judge_held_out(const TermModel& model, const TermData& kept, const TermData
   }
 }
 
-void find_states_of_outputs(const Inputs& inputs, const MeasuredOutputs& measured, Missing& missing) {
+void find_states_of_outputs(const Recording& recording, const MeasuredOutputs& measured, Missing& missing) {
   if (missing.found.empty()) return;
-  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
-  constexpr Eigen::Index lags = 2;
-  const Derivatives derivatives(rows, lags * smooth_lag(rows, inputs.values));
+  const Inputs& inputs = recording.inputs();
+  const Derivatives& derivatives = recording.derivatives();
   for (FoundTerm& found : missing.found) {
     if (found.generic || found.inputs.size() != 1) continue;
     const auto place = std::ranges::find(inputs.names, found.inputs.front()) - inputs.names.begin();

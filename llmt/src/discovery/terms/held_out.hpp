@@ -15,6 +15,6 @@ void judge_held_out(const TermModel& model, const TermData& kept, const TermData
 
 /// For rows in time. Sets FoundTerm::inner_state of terms whose input is a derivative of the output by time: they stand
 /// for a state.
-void find_states_of_outputs(const Inputs& inputs, const MeasuredOutputs& measured, Missing& missing);
+void find_states_of_outputs(const Recording& recording, const MeasuredOutputs& measured, Missing& missing);
 
 }  // namespace llmt::discovery

@@ -6,45 +6,15 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "discovery/terms/column_cache.hpp"
-#include "discovery/terms/derivatives.hpp"
-#include "discovery/terms/row_filter.hpp"
 #include "llmt/random.hpp"
 
 namespace llmt::discovery {
 namespace {
 
 constexpr int pairs_of_draws = 4;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
-// Divided differences within recordings, a row each, weighted so that white noise has the same variance in them. Of a
-// signal of 12 rows a period those of order 8 leave 1e-4, of a slower one less: the motion is not in them.
-Eigen::MatrixXd differences_of_order(Eigen::Index order, const Rows& rows, const Eigen::MatrixXd& values) {
-  const std::vector<Recorded> recorded = recordings(rows);
-  const auto n = std::ssize(rows.sequence);
-  Eigen::MatrixXd all(n, values.cols());
-  Eigen::Index count = 0;
-  for (Eigen::Index k = 0; k + order < n; ++k) {
-    if (recorded[k].begin != recorded[k + order].begin) continue;
-    const std::vector<Eigen::Index> window(rows.sequence.begin() + k, rows.sequence.begin() + k + order + 1);
-    const Eigen::ArrayXd times = rows.instants(window) / (rows.instants(window.back()) - rows.instants(window.front()));
-    Eigen::VectorXd weights(order + 1);
-    for (Eigen::Index i = 0; i <= order; ++i) {
-      double product = 1.0;
-      for (Eigen::Index j = 0; j <= order; ++j) product *= j == i ? 1.0 : times(i) - times(j);
-      weights(i) = 1.0 / product;
-    }
-    all.row(count++) = weights.normalized().transpose() * values(window, Eigen::all);
-  }
-  all.conservativeResize(count, Eigen::NoChange);
-  return all;
-}
 
 Eigen::VectorXd stacked(const TermData& data, const Eigen::MatrixXd& of_rows) {
   const Eigen::MatrixXd of_samples = means(of_rows, data.samples);
@@ -106,102 +76,46 @@ Eigen::MatrixXd jacobian(const TermModel& model, const TermData& data, const Ter
 
 // The model at inputs with errors once more.
 struct InputNoise::Draw {
-  Inputs inputs;
+  explicit Draw(Recording moved) : recording(std::move(moved)) {}
+
+  Recording recording;
   Simulation simulation;
   std::unique_ptr<TermModel> model;
   Eigen::MatrixXd change;    // n x d of the simulation
   Eigen::MatrixXd filtered;  // n x d, `change` through the filter of the log
 };
 
-Eigen::MatrixXd noise_in_time(const Rows& rows, const Inputs& inputs) {
-  constexpr double jump = 5.0;  // robust standard deviations
-  constexpr double normal_median = 0.6745;
-  constexpr double largest_share = 0.4;
-  const Eigen::Index p = inputs.values.cols();
-  constexpr Eigen::Index fewest = 50;
-  Eigen::MatrixXd differences;
-  for (const Eigen::Index order : {8, 6, 4}) {  // short recordings have none of a high order
-    differences = differences_of_order(order, rows, inputs.values);
-    if (differences.rows() >= fewest) break;
-  }
-  if (differences.rows() < fewest) return Eigen::MatrixXd::Zero(p, p);
-  Eigen::VectorXd limits(p);
-  for (Eigen::Index j = 0; j < p; ++j) {
-    const Eigen::VectorXd own = differences.col(j).cwiseAbs();
-    limits(j) = jump * median({own.begin(), own.end()}) / normal_median;
-    if (!(limits(j) > 0.0)) limits(j) = own.maxCoeff();  // most are equal: an encoder at rest
-  }
-  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(p, p);
-  double count = 0.0;
-  for (Eigen::Index i = 0; i < differences.rows(); ++i) {
-    if ((differences.row(i).transpose().cwiseAbs().array() > limits.array()).any()) continue;
-    sum += differences.row(i).transpose() * differences.row(i);
-    count += 1.0;
-  }
-  Eigen::MatrixXd covariance = count > 0.0 ? Eigen::MatrixXd(sum / count) : Eigen::MatrixXd::Zero(p, p);
-  for (Eigen::Index j = 0; j < p; ++j) {
-    const double variance = (inputs.values.col(j).array() - inputs.values.col(j).mean()).square().mean();
-    constexpr double rounding = 1e-12;
-    const bool is_noise = covariance(j, j) > rounding * variance && covariance(j, j) <= largest_share * variance;
-    if (inputs.names[j] != inputs.order && is_noise) continue;
-    covariance.row(j).setZero();
-    covariance.col(j).setZero();
-  }
-  return covariance;
-}
-
-Eigen::MatrixXd covariance_of_errors(const Rows& rows, const Inputs& inputs) {
-  const Eigen::Index p = inputs.values.cols();
-  const bool in_time = inputs.instants.size() > 0;
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(p, p);
-  if (in_time) covariance = noise_in_time(rows, inputs);
-  for (Eigen::Index j = 0; j < inputs.noise.size(); ++j) {
-    const double given = inputs.noise(j);
-    if (std::isnan(given)) continue;
-    const double own = std::sqrt(covariance(j, j));
-    const double factor = own > 0.0 ? given / own : 0.0;
-    // Filtered rows share their errors with their neighbours, so differences say nothing of them.
-    covariance.row(j) *= inputs.cutoff > 0.0 ? 0.0 : factor;
-    covariance.col(j) *= inputs.cutoff > 0.0 ? 0.0 : factor;
-    covariance(j, j) = given * given;
-  }
-  return covariance;
-}
-
-InputNoise::InputNoise(const TermModel& model, const Inputs& inputs, const Eigen::MatrixXd& simulated,
-                       const Eigen::MatrixXd& covariance)
-    : model_(&model), inputs_(&inputs), surrogate_(inputs.values, simulated) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
+InputNoise::InputNoise(const TermModel& model, const Eigen::MatrixXd& simulated)
+    : model_(&model), surrogate_(model.recording().surrogate(simulated)) {
+  const Recording& recording = model.recording();
+  const Inputs& inputs = recording.inputs();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(recording.covariance());
   const Eigen::MatrixXd root =
       axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * axes.eigenvectors().transpose();
-  const Eigen::MatrixXd described = surrogate_.predict(inputs.values);
+  const Eigen::MatrixXd described = surrogate_->predict(inputs.values);
   Random random(1);
   for (int pair = 0; pair < pairs_of_draws; ++pair) {
     Eigen::MatrixXd errors(inputs.values.rows(), inputs.values.cols());
     for (double& value : errors.reshaped()) value = random.normal();
-    if (inputs.cutoff > 0.0) {
-      const RowFilter filter(inputs);
-      errors = filter(errors) / filter.weights().norm();
-    }
+    if (recording.is_filtered()) errors = recording.filter()(errors) / recording.filter().weights().norm();
     errors = errors * root;
     for (const double sign : {1.0, -1.0}) {
-      auto draw = std::make_shared<Draw>();
-      draw->inputs = inputs;
-      draw->inputs.values += sign * errors;
+      Eigen::MatrixXd moved = inputs.values + sign * errors;
       // Terms such as roots are not defined beyond the inputs.
       for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
         const double low = inputs.values.col(j).minCoeff();
         const double high = inputs.values.col(j).maxCoeff();
-        draw->inputs.values.col(j) = draw->inputs.values.col(j).cwiseMax(low).cwiseMin(high);
+        moved.col(j) = moved.col(j).cwiseMax(low).cwiseMin(high);
       }
-      draw->change = surrogate_.predict(draw->inputs.values) - described;
-      draw->filtered = as_measured(inputs, draw->change);
+      auto draw = std::make_shared<Draw>(recording.with_values(std::move(moved)));
+      draw->change = surrogate_->predict(draw->recording.inputs().values) - described;
+      draw->filtered = recording.as_measured(draw->change);
       draw->simulation.parameters = model.parameters();
       draw->simulation.predict = [base = model_, own = draw.get()](const Eigen::MatrixXd&,
                                                                    const Eigen::VectorXd& values) -> Eigen::MatrixXd {
         return base->simulated(values) + own->change;
       };
-      draw->model = std::make_unique<TermModel>(draw->simulation, draw->inputs, model.outputs(), model.terms());
+      draw->model = std::make_unique<TermModel>(draw->simulation, draw->recording, model.outputs(), model.terms());
       draw->model->share(model.shared(), draws_.size() + 1);
       draws_.push_back(std::move(draw));
     }
@@ -337,7 +251,7 @@ Eigen::MatrixXd InputNoise::variances(const TermFit& fit) const {
   const Eigen::MatrixXd as_given = model_->predict(fit.parameters, fit.placed);
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(as_given.rows(), as_given.cols());
   for (const std::shared_ptr<const Draw>& draw : draws_)
-    sum += as_measured(*inputs_, draw->model->predict(fit.parameters, fit.placed) - as_given).cwiseAbs2();
+    sum += model_->recording().as_measured(draw->model->predict(fit.parameters, fit.placed) - as_given).cwiseAbs2();
   return sum / static_cast<double>(draws_.size());
 }
 

@@ -4,15 +4,10 @@
 #include <memory>
 #include <vector>
 
-#include "discovery/terms/surrogate.hpp"
+#include "discovery/recording/surrogate.hpp"
 #include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
-
-/// Covariance of the errors of inputs that are smooth in time, from divided differences of order 8 (of 6 or 4 where
-/// fewer than 50 rows have such), which leave next to nothing of the motion. Rows where a signal jumps (a difference
-/// beyond 5 robust standard deviations of any column) do not count. Zero for columns that are constant or not smooth.
-Eigen::MatrixXd noise_in_time(const Rows& rows, const Inputs& inputs);
 
 /// The simulation was computed at x + e, e the errors of the inputs, so residuals hold s(x) - s(x + e), and the
 /// signature T(x + e) of a term holds e too: in expectation T'r is off by E[T(x + e)'(s(x) - s(x + e))] even where
@@ -21,9 +16,8 @@ Eigen::MatrixXd noise_in_time(const Rows& rows, const Inputs& inputs);
 /// Cook and Stefanski 1994, with a straight line). The simulation at other inputs is described by a Surrogate.
 class InputNoise {
  public:
-  /// `covariance` p x p of the errors. Keeps references to `model` and `inputs`.
-  InputNoise(const TermModel& model, const Inputs& inputs, const Eigen::MatrixXd& simulated,
-             const Eigen::MatrixXd& covariance);
+  /// Keeps a reference to `model`.
+  InputNoise(const TermModel& model, const Eigen::MatrixXd& simulated);
 
   /// What signature' residuals of a placed term lacks for the errors, k; `simulated` as stacked_signature() takes it.
   Eigen::VectorXd moment_correction(const TermData& data, const PlacedTerm& placed,
@@ -47,7 +41,7 @@ class InputNoise {
   std::vector<std::string> correct(const TermData& data, TermFit& fit) const;
 
   /// d: share of the variance of the simulation that the surrogate describes.
-  const Eigen::VectorXd& described() const { return surrogate_.described(); }
+  const Eigen::VectorXd& described() const { return surrogate_->described(); }
   /// Rows x d: mean square of what the errors add to the prediction of a fit, as it is measured.
   Eigen::MatrixXd variances(const TermFit& fit) const;
   /// Samples x d: mean square of what the errors add to the simulated outputs.
@@ -56,12 +50,8 @@ class InputNoise {
  private:
   struct Draw;
   const TermModel* model_;
-  const Inputs* inputs_;
-  Surrogate surrogate_;
+  std::shared_ptr<const Surrogate> surrogate_;
   std::vector<std::shared_ptr<const Draw>> draws_;
 };
-
-/// Covariance of the errors of the inputs: as Inputs::noise says, estimated by noise_in_time() where it says nothing.
-Eigen::MatrixXd covariance_of_errors(const Rows& rows, const Inputs& inputs);
 
 }  // namespace llmt::discovery

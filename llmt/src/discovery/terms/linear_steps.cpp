@@ -4,10 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "discovery/recording/recording.hpp"
+#include "discovery/recording/refuse.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/random_simulation.hpp"
-#include "discovery/terms/refuse.hpp"
-#include "discovery/terms/row_filter.hpp"
+#include "discovery/terms/term_model.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/statistics.hpp"
 
@@ -66,15 +67,10 @@ class Linearisation {
   const MeasuredOutputs& measured_;
 };
 
-Eigen::VectorXd values_of(const std::vector<Parameter>& parameters) {
-  Eigen::VectorXd values(std::ssize(parameters));
-  for (std::size_t k = 0; k < parameters.size(); ++k) values(static_cast<Eigen::Index>(k)) = parameters[k].value;
-  return values;
-}
-
 // What the terms add, n x d.
-Eigen::MatrixXd added(const Simulation& linear, const Missing& missing, const Inputs& inputs) {
-  return missing.corrected - as_measured(inputs, linear.predict(inputs.values, values_of(missing.parameters)));
+Eigen::MatrixXd added(const Simulation& linear, const Missing& missing, const Recording& recording) {
+  return missing.corrected -
+         recording.as_measured(linear.predict(recording.inputs().values, values_of(missing.parameters)));
 }
 
 // Sum of squares at the rows searched that are no outliers, outputs by their spread.
@@ -186,6 +182,7 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
                               const MissingOptions& options) {
   const Linearisation linearisation(simulation, derivatives, inputs, measured);
   const Eigen::VectorXd start = values_of(simulation.parameters);
+  const Recording recording(inputs);
   const Eigen::MatrixXd nominal = linearisation.outputs(start);
   refuse_random(nominal, linearisation.outputs(start), measured.names);
   Eigen::VectorXd values = start;
@@ -196,8 +193,8 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
   for (int step = 0; step < most_steps && !settled; ++step) {
     const Simulation linear = linearisation.at(values, outputs);
     missing = find_missing(linear, inputs, measured, terms, options);
-    terms_added = added(linear, missing, inputs);
-    const double before = left(missing, measured, as_measured(inputs, outputs) + terms_added);
+    terms_added = added(linear, missing, recording);
+    const double before = left(missing, measured, recording.as_measured(outputs) + terms_added);
     Eigen::VectorXd next = values_of(missing.parameters);
     Eigen::MatrixXd at_next = linearisation.outputs(next);
     settled = has_settled(missing, values) || is_linear(linear.predict(inputs.values, next), at_next, measured);
@@ -205,7 +202,7 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
     constexpr double rounding = 1e-9;
     for (int k = 0;
          k < most_halvings &&
-         left(missing, measured, as_measured(inputs, at_next) + terms_added) > (1.0 + rounding) * before && !settled;
+         left(missing, measured, recording.as_measured(at_next) + terms_added) > (1.0 + rounding) * before && !settled;
          ++k) {
       next = 0.5 * (next + values);
       at_next = linearisation.outputs(next);
@@ -220,13 +217,13 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
     missing.parameters[k].value = values(static_cast<Eigen::Index>(k));
   }
-  missing.corrected = as_measured(inputs, outputs) + terms_added;
+  missing.corrected = recording.as_measured(outputs) + terms_added;
   Eigen::VectorXd alone = start;
   for (const FittedParameter& fitted : missing.fitted_parameters) {
     const auto first = std::ranges::find(missing.parameters, fitted.parts.front(), &Parameter::name);
     alone(first - missing.parameters.begin()) += fitted.alone;
   }
-  missing.before = missing.found.empty() ? missing.corrected : as_measured(inputs, linearisation.outputs(alone));
+  missing.before = missing.found.empty() ? missing.corrected : recording.as_measured(linearisation.outputs(alone));
   const Samples aside = set_aside(missing);
   for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
     Gap& gap = missing.gaps[static_cast<std::size_t>(o)];
@@ -236,7 +233,7 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
       return means(left, aside);
     };
     const double known_noise = gap.known_noise;
-    gap = gap_of(gap.output, errors(as_measured(inputs, nominal)), errors(missing.before), errors(missing.corrected),
+    gap = gap_of(gap.output, errors(recording.as_measured(nominal)), errors(missing.before), errors(missing.corrected),
                  gap.noise_floor);
     gap.known_noise = known_noise;
   }

@@ -7,7 +7,6 @@
 #include <functional>
 #include <utility>
 
-#include "discovery/terms/derivatives.hpp"
 #include "discovery/terms/resonance.hpp"
 
 namespace llmt::discovery {
@@ -140,11 +139,12 @@ Eigen::VectorXd lagged(const Rows& rows, const Eigen::VectorXd& signal, double t
   return z;
 }
 
-std::vector<ModelTerm> memory_terms(const Inputs& inputs, const Rows& rows, const std::vector<Motion>& motions,
-                                    const std::string& output) {
+std::vector<ModelTerm> memory_terms(const Recording& recording, const std::string& output) {
+  const Inputs& inputs = recording.inputs();
+  const Rows& rows = recording.rows();
   constexpr double ratio = 1.5;
   const double step = median_step(rows);
-  const double fast = step * static_cast<double>(smooth_lag(rows, inputs.values));  // a tenth of a period
+  const double fast = step * static_cast<double>(recording.lag());  // a tenth of a period
   const double whole = longest_run(rows);
   std::vector<ModelTerm> terms;
   if (!(step > 0.0) || !(whole > 10.0 * fast)) return terms;
@@ -153,24 +153,24 @@ std::vector<ModelTerm> memory_terms(const Inputs& inputs, const Rows& rows, cons
   for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
     const std::string& x = inputs.names[static_cast<std::size_t>(j)];
     if (!(inputs.values.col(j).maxCoeff() > inputs.values.col(j).minCoeff())) continue;
-    using Signal = Eigen::VectorXd;
+    using Column = Eigen::VectorXd;
     terms.push_back(slow_state(
         "memory", x, fmt::format("{0} - lag {0}, tau d(lag)/dt = {0} - lag", x), x, times,
-        [](const Rows& own, const Signal& v, double tau) -> Signal { return v - lagged(own, v, tau, true); }, j,
+        [](const Rows& own, const Column& v, double tau) -> Column { return v - lagged(own, v, tau, true); }, j,
         output));
     terms.push_back(slow_state(
         "warming", x, fmt::format("{0} lag {0}^2, tau d(lag)/dt = {0}^2 - lag", x), x + "^3", times,
-        [](const Rows& own, const Signal& v, double tau) -> Signal {
+        [](const Rows& own, const Column& v, double tau) -> Column {
           return v.cwiseProduct(lagged(own, v.cwiseAbs2(), tau, false));
         },
         j, output));
     terms.push_back(slow_state(
         "warmth", x, fmt::format("lag {0}^2, tau d(lag)/dt = {0}^2 - lag", x), x + "^2", times,
-        [](const Rows& own, const Signal& v, double tau) -> Signal { return lagged(own, v.cwiseAbs2(), tau, false); },
+        [](const Rows& own, const Column& v, double tau) -> Column { return lagged(own, v.cwiseAbs2(), tau, false); },
         j, output));
   }
   std::vector<Eigen::Index> moving;
-  for (const Motion& motion : motions) {
+  for (const Motion& motion : recording.axes()) {
     moving.push_back(motion.speed);
     moving.push_back(motion.acceleration);
   }

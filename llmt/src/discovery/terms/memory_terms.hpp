@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "discovery/terms/motion.hpp"
+#include "discovery/recording/recording.hpp"
 #include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
@@ -18,7 +18,6 @@ Eigen::VectorXd lagged(const Rows& rows, const Eigen::VectorXd& signal, double t
 /// first-order lag with the time constant tau makes of it: x - lag x (creep, a second vessel or mass behind it), x lag
 /// x^2 and lag x^2 (heat of its losses, from 0 at the beginning); and, for speeds and accelerations, H x - x (a load
 /// that swings, see resonant_part()).
-std::vector<ModelTerm> memory_terms(const Inputs& inputs, const Rows& rows, const std::vector<Motion>& motions,
-                                    const std::string& output);
+std::vector<ModelTerm> memory_terms(const Recording& recording, const std::string& output);
 
 }  // namespace llmt::discovery

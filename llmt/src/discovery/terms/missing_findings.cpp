@@ -6,11 +6,10 @@
 #include <cmath>
 #include <set>
 
-#include "discovery/terms/derivatives.hpp"
+#include "discovery/recording/derivatives.hpp"
 #include "discovery/terms/input_noise.hpp"
 #include "discovery/terms/outliers.hpp"
 #include "discovery/terms/structure.hpp"
-#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -22,14 +21,15 @@ std::string unit_of(const std::string& output, const std::string& per) {
 }
 
 // What a filtered input changes by from row to row where it passes 0, in the middle of all such steps; 0: not known.
-double step_across_zero(const Inputs& inputs, Eigen::Index column) {
+double step_across_zero(const Recording& recording, Eigen::Index column) {
   std::vector<double> steps;
-  if (!(inputs.cutoff > 0.0)) return 0.0;
-  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
+  if (!recording.is_filtered()) return 0.0;
+  const Rows& rows = recording.rows();
+  const Eigen::MatrixXd& inputs = recording.inputs().values;
   const std::vector<Recorded> recorded = recordings(rows);
   for (std::size_t k = 1; k < rows.sequence.size(); ++k) {
-    const double before = inputs.values(rows.sequence[k - 1], column);
-    const double now = inputs.values(rows.sequence[k], column);
+    const double before = inputs(rows.sequence[k - 1], column);
+    const double now = inputs(rows.sequence[k], column);
     if (recorded[k].begin == recorded[k - 1].begin && before * now < 0.0) steps.push_back(std::abs(now - before));
   }
   if (steps.empty()) return 0.0;
@@ -191,7 +191,7 @@ std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector
 }
 
 std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::vector<ModelTerm>& terms,
-                                           const Inputs& inputs, const Eigen::VectorXd& of_smoothed) {
+                                           const Recording& recording, const Eigen::VectorXd& of_smoothed) {
   // Up to 3 the sign of the input may be wrong, and what the simulation has of it.
   constexpr double visible = 4.0;  // standard deviations
   constexpr double smoothed_away = 2.0;
@@ -201,13 +201,13 @@ std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::ve
     return !constants.empty() && constants.front().width;
   };
   if (std::ranges::none_of(missing.found, has_width)) return narrow;
-  const Eigen::VectorXd variance =
-      covariance_of_errors(rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows())), inputs).diagonal();
+  const std::vector<std::string>& names = recording.inputs().names;
+  const Eigen::VectorXd variance = recording.covariance().diagonal();
   for (const FoundTerm& found : missing.found) {
     if (!has_width(found)) continue;
-    const auto column = std::ranges::find(inputs.names, found.inputs.front()) - inputs.names.begin();
-    const double least = std::max(
-        {visible * std::sqrt(variance(column)), smoothed_away * of_smoothed(column), step_across_zero(inputs, column)});
+    const auto column = std::ranges::find(names, found.inputs.front()) - names.begin();
+    const double least = std::max({visible * std::sqrt(variance(column)), smoothed_away * of_smoothed(column),
+                                   step_across_zero(recording, column)});
     if (std::abs(found.constants(0)) < least) narrow.insert(found.term);
   }
   return narrow;

@@ -46,7 +46,7 @@ std::set<std::size_t> beyond_constants(const Missing& missing, const std::vector
 /// before are `of_smoothed`, 2 of these count as well: the simulation saw them. In filtered rows what the input changes
 /// by from row to row where it passes 0 counts too: no row need stand in a peak that is narrower.
 std::set<std::size_t> narrower_than_errors(const Missing& missing, const std::vector<ModelTerm>& terms,
-                                           const Inputs& inputs, const Eigen::VectorXd& of_smoothed);
+                                           const Recording& recording, const Eigen::VectorXd& of_smoothed);
 
 /// States found whose size may be 0, or that errors of the inputs could make. They filter the simulated output, and so
 /// take errors of the inputs out of it.

@@ -5,16 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "discovery/terms/correlation.hpp"
+#include "discovery/recording/noise.hpp"
+#include "discovery/recording/refuse.hpp"
+#include "discovery/recording/row_filter.hpp"
+#include "discovery/recording/row_split.hpp"
+#include "discovery/recording/standstill.hpp"
 #include "discovery/terms/decision.hpp"
 #include "discovery/terms/errors_of_inputs.hpp"
 #include "discovery/terms/fitted_parameters.hpp"
 #include "discovery/terms/held_out.hpp"
 #include "discovery/terms/missing_findings.hpp"
-#include "discovery/terms/refuse.hpp"
-#include "discovery/terms/row_filter.hpp"
-#include "discovery/terms/row_split.hpp"
-#include "discovery/terms/standstill.hpp"
 #include "discovery/terms/term_question.hpp"
 #include "discovery/terms/term_rounds.hpp"
 #include "llmt/statistics.hpp"
@@ -74,25 +74,23 @@ void set_known_noise(const MeasuredOutputs& measured, const ErrorsOfInputs& erro
 
 }  // namespace
 
-RowSplit split_of(const Inputs& inputs, const SearchedRows& searched, const MissingOptions& options) {
-  const bool in_time = inputs.instants.size() > 0;
-  const RowSplit split =
-      in_time ? split_in_time(inputs, options, searched.fewest_samples) : split_independent(inputs, options);
+RowSplit split_of(const Recording& recording, const SearchedRows& searched, const MissingOptions& options) {
+  const RowSplit split = recording.is_in_time() ? split_in_time(recording, options, searched.fewest_samples)
+                                                : split_independent(recording.inputs(), options);
   const bool has_apart = std::ranges::find(searched.apart, true) != searched.apart.end();
   return has_apart ? without_rows(split, searched.apart) : split;
 }
 
-Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+Missing search_once(const Simulation& simulation, const Recording& recording, const MeasuredOutputs& measured,
                     const std::vector<ModelTerm>& terms, const SearchedRows& searched, const MissingOptions& options,
                     const std::set<std::size_t>& refuted) {
-  const bool in_time = inputs.instants.size() > 0;
+  const bool in_time = recording.is_in_time();
   Simulation distinct = simulation;
-  TermModel model(distinct, inputs, measured.names, terms, refuted);
+  TermModel model(distinct, recording, measured.names, terms, refuted);
   model.share(searched.columns, 0);
-  Eigen::VectorXd start(std::ssize(simulation.parameters));
-  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
-  RowSplit split = split_of(inputs, searched, options);
-  ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
+  const Eigen::VectorXd start = values_of(simulation.parameters);
+  RowSplit split = split_of(recording, searched, options);
+  ErrorsOfInputs errors = errors_of_inputs(model, measured, start, split);
   const Eigen::Index d = measured.values.cols();
   TermData data = data_of(split.searched, measured);
   data.stretches = split.stretches;
@@ -134,10 +132,10 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   }
   const TermData kept = without_samples(data, settled.verdict.outliers);
   if (!settled.verdict.outliers.empty()) baseline = fit_terms(model, kept, start, {});
-  const Eigen::MatrixXd nominal = as_measured(inputs, model.predict(start, {}));
-  missing.before = as_measured(inputs, model.predict(baseline.parameters, {}));
-  missing.corrected = as_measured(inputs, model.predict(settled.fit.parameters, settled.fit.placed));
-  missing.structure = structure_beside(model, kept, inputs, errors.deviations, missing);
+  const Eigen::MatrixXd nominal = recording.as_measured(model.predict(start, {}));
+  missing.before = recording.as_measured(model.predict(baseline.parameters, {}));
+  missing.corrected = recording.as_measured(model.predict(settled.fit.parameters, settled.fit.placed));
+  missing.structure = structure_beside(model, kept, recording.inputs(), errors.deviations, missing);
   // Independent rows with errors of the inputs deviate like their neighbours: the errors alone do that.
   if (errors.noise && !in_time) missing.structure.clear();
   TermData aside = data_of(split.held_out, measured);
@@ -145,7 +143,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   aside.weights = data.weights;
   missing.weights = data.weights ? *data.weights : Eigen::MatrixXd();
   judge_held_out(model, kept, aside, baseline, settled, in_time ? errors.noise.get() : nullptr, missing);
-  if (in_time) find_states_of_outputs(inputs, measured, missing);
+  if (in_time) find_states_of_outputs(recording, measured, missing);
   missing.notes.insert(missing.notes.end(), errors.notes.begin(), errors.notes.end());
   judge_findings(missing, in_time);
   doubt_uncorrected(errors, missing);

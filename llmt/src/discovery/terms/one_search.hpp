@@ -5,8 +5,8 @@
 #include <set>
 #include <vector>
 
+#include "discovery/recording/row_split.hpp"
 #include "discovery/terms/column_cache.hpp"
-#include "discovery/terms/row_split.hpp"
 #include "llmt/discovery/missing.hpp"
 #include "llmt/discovery/model_term.hpp"
 
@@ -20,10 +20,10 @@ struct SearchedRows {
 };
 
 /// The rows that are searched and those set aside.
-RowSplit split_of(const Inputs& inputs, const SearchedRows& searched, const MissingOptions& options);
+RowSplit split_of(const Recording& recording, const SearchedRows& searched, const MissingOptions& options);
 
 /// Searches all terms but those refuted at all rows but those apart, and judges what it finds on the rows set aside.
-Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+Missing search_once(const Simulation& simulation, const Recording& recording, const MeasuredOutputs& measured,
                     const std::vector<ModelTerm>& terms, const SearchedRows& searched, const MissingOptions& options,
                     const std::set<std::size_t>& refuted);
 

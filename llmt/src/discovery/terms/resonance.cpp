@@ -4,7 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "discovery/terms/derivatives.hpp"
+#include "discovery/recording/derivatives.hpp"
+#include "discovery/recording/noise.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -21,7 +22,7 @@ class Oscillator {
 
   // u goes from `before` to `now` in a straight line.
   void step(double before, double now, double duration) {
-    if (std::abs(duration - duration_) > same * duration) prepare(duration);
+    if (std::abs(duration - duration_) > same_time * duration) prepare(duration);
     const double slope = (now - before) / duration;
     const double square = omega_ * omega_;
     const double lag = 2.0 * damping_ * slope / (square * omega_);
@@ -35,7 +36,6 @@ class Oscillator {
   double acceleration(double u) const { return u - 2.0 * damping_ * omega_ * speed_ - omega_ * omega_ * z_; }
 
  private:
-  static constexpr double same = 1e-7;
   double omega_;
   double damping_;
   double duration_ = 0.0;

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "discovery/terms/row_filter.hpp"
+#include "discovery/recording/row_filter.hpp"
 #include "discovery/terms/term_question.hpp"
 
 namespace llmt::discovery {
@@ -53,11 +53,11 @@ Eigen::VectorXd weigh(const TermModel& model, const TermFit& fit, const KnownErr
                       const std::vector<std::size_t>& outliers, TermData& data) {
   const Eigen::VectorXd& noise = errors.of_outputs;
   const Eigen::MatrixXd predicted = model.predict(fit.parameters, fit.placed);
-  Eigen::MatrixXd variances = squared_errors_of_steps(model.inputs(), predicted);
+  Eigen::MatrixXd variances = model.recording().squared_errors_of_steps(predicted);
   if (errors.of_inputs != nullptr) {
-    const RowFilter filter(model.inputs());
     const Eigen::MatrixXd of_inputs = errors.of_inputs->variances(fit);
-    for (Eigen::Index o = 0; o < noise.size(); ++o) variances.col(o) += moderated(of_inputs.col(o), filter);
+    for (Eigen::Index o = 0; o < noise.size(); ++o)
+      variances.col(o) += moderated(of_inputs.col(o), model.recording().filter());
   }
   const TermData kept = without_samples(data, outliers);
   const Eigen::MatrixXd left = kept.measured - means(predicted, kept.samples);

@@ -4,26 +4,27 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <memory>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
+#include "discovery/recording/apart.hpp"
+#include "discovery/recording/motion.hpp"
+#include "discovery/recording/noise.hpp"
+#include "discovery/recording/recording.hpp"
+#include "discovery/recording/refuse.hpp"
+#include "discovery/recording/row_split.hpp"
+#include "discovery/recording/standstill.hpp"
 #include "discovery/terms/averaged_rows.hpp"
 #include "discovery/terms/contests.hpp"
-#include "discovery/terms/correlation.hpp"
 #include "discovery/terms/determined.hpp"
 #include "discovery/terms/final_fit.hpp"
-#include "discovery/terms/limits.hpp"
 #include "discovery/terms/missing_findings.hpp"
-#include "discovery/terms/motion.hpp"
 #include "discovery/terms/one_search.hpp"
 #include "discovery/terms/progress_of_searches.hpp"
 #include "discovery/terms/random_simulation.hpp"
-#include "discovery/terms/refuse.hpp"
-#include "discovery/terms/reversals.hpp"
-#include "discovery/terms/row_filter.hpp"
-#include "discovery/terms/row_split.hpp"
-#include "discovery/terms/standstill.hpp"
-#include "discovery/terms/surrogate.hpp"
 #include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
@@ -91,28 +92,21 @@ Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::st
 
 namespace {
 
-Eigen::VectorXd nominal_values(const Simulation& simulation) {
-  Eigen::VectorXd nominal(std::ssize(simulation.parameters));
-  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) nominal(k) = simulation.parameters[k].value;
-  return nominal;
-}
-
-// Rows in time with the bands within which inputs rest.
-Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const MeasuredOutputs& measured) {
-  if (inputs.instants.size() == 0 || inputs.zero_bands.size() > 0) return inputs;
-  const Eigen::MatrixXd simulated = simulation.predict(inputs.values, nominal_values(simulation));
+// The zero bands of rows in time.
+Recording with_rest(const Simulation& simulation, const Recording& recording, const MeasuredOutputs& measured) {
+  const Inputs& inputs = recording.inputs();
+  if (!recording.is_in_time() || inputs.zero_bands.size() > 0) return recording;
+  const Eigen::MatrixXd simulated = simulation.predict(inputs.values, values_of(simulation.parameters));
   // What has the wrong shape is refused by the search.
-  if (simulated.rows() != measured.values.rows() || simulated.cols() != measured.values.cols()) return inputs;
+  if (simulated.rows() != measured.values.rows() || simulated.cols() != measured.values.cols()) return recording;
   // Dry friction jumps where a speed passes 0, that of the simulation beside what it lacks.
-  const Surrogate surrogate(inputs.values, simulated);
-  Eigen::MatrixXd deviations = measured.values - as_measured(inputs, simulated);
-  constexpr double described = 0.9;
-  if (surrogate.described().minCoeff() >= described) {
-    deviations += as_measured(inputs, surrogate.jumps(inputs.values));
+  const std::shared_ptr<const Surrogate> surrogate = recording.surrogate(simulated);
+  Eigen::MatrixXd deviations = measured.values - recording.as_measured(simulated);
+  if (surrogate->described().minCoeff() >= roughly_described) {
+    deviations += recording.as_measured(surrogate->jumps(inputs.values));
   }
-  inputs.zero_bands = zero_bands(inputs, deviations);
-  if (!(inputs.zero_bands.array() > 0.0).any()) inputs.zero_bands.resize(0);
-  return inputs;
+  const Eigen::VectorXd bands = zero_bands(recording, deviations);
+  return (bands.array() > 0.0).any() ? recording.with_zero_bands(bands) : recording;
 }
 
 // Searches until what is found holds on the rows set aside. Terms that are refuted there are no candidates of the next
@@ -121,15 +115,14 @@ Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const Measur
 Missing find_at(const Simulation& simulation, const SmoothedInputs& smooth, const MeasuredOutputs& measured,
                 const std::vector<ModelTerm>& terms, const SearchedRows& rows, MissingOptions& options,
                 std::set<std::size_t>& refuted, Missing missing) {
-  const Inputs& inputs = smooth.inputs;
-  const bool in_time = inputs.instants.size() > 0;
+  const bool in_time = smooth.recording.is_in_time();
   const int most = in_time ? 4 : 3;
   std::set<std::size_t> unproven;
   std::vector<std::string> notes;
   for (int trial = 1;; ++trial) {
-    if (trial > 1) missing = search_once(simulation, inputs, measured, terms, rows, options, refuted);
+    if (trial > 1) missing = search_once(simulation, smooth.recording, measured, terms, rows, options, refuted);
     const std::set<std::size_t> beyond = beyond_constants(missing, terms);
-    const std::set<std::size_t> narrow = narrower_than_errors(missing, terms, inputs, smooth.errors);
+    const std::set<std::size_t> narrow = narrower_than_errors(missing, terms, smooth.recording, smooth.errors);
     const std::set<std::size_t> chance = states_by_chance(missing);
     const auto is_unproven = [&](const FoundTerm& found) { return in_time && !found.shrinks_gap; };
     const bool holds =
@@ -181,21 +174,21 @@ bool resonance_comes_first(const Missing& missing, const std::vector<ModelTerm>&
 struct Beginning {
   SearchedRows rows;
   Missing missing;
-  std::vector<std::string> at_reversals;  // notes
+  std::vector<Apart> at_reversals;
 };
 
 // Chooses the rows: averaged or not, with reversals or without. Ends where a state has constants beyond those tried.
-Beginning begin(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+Beginning begin(const Simulation& simulation, const Recording& recording, const MeasuredOutputs& measured,
                 const std::vector<ModelTerm>& terms, SearchedRows rows, const MissingOptions& options,
                 const std::set<std::size_t>& refuted) {
   Beginning now{std::move(rows), {}, {}};
   const auto search = [&] {
-    now.missing = search_once(simulation, inputs, measured, terms, now.rows, options, refuted);
+    now.missing = search_once(simulation, recording, measured, terms, now.rows, options, refuted);
   };
   const auto is_beyond = [&] { return !beyond_constants(now.missing, terms).empty(); };
   search();
   // Filtered alike, the simulation is right at reversals, and samples are as far apart as they are independent.
-  if (inputs.instants.size() == 0 || inputs.cutoff > 0.0 || is_beyond()) return now;
+  if (!recording.is_in_time() || recording.is_filtered() || is_beyond()) return now;
   // What is left is alike in neighbours: single rows say little more than their means, which hold less noise. A state
   // is of single rows, and rings after reversals.
   constexpr double alike = 0.5;  // independent share
@@ -208,74 +201,77 @@ Beginning begin(const Simulation& simulation, const Inputs& inputs, const Measur
   }
   constexpr int most = 3;
   for (int k = 0; k < most && !is_beyond() && !resonance_comes_first(now.missing, terms); ++k) {
-    const std::vector<Reversals> reversals = left_at_reversals(inputs, measured, now.missing, now.rows.apart);
-    if (reversals.empty()) break;
+    const std::vector<Apart> at_reversals =
+        rows_apart(ApartWhen::after_a_search, {recording, measured, now.missing.corrected, &now.missing});
+    if (at_reversals.empty()) break;
+    mark(at_reversals, now.rows.apart);
     search();
-    now.at_reversals = notes_on_reversals(reversals);
+    now.at_reversals = at_reversals;
   }
   return now;
 }
 
 // The search sees inputs without most of their errors. The answer is of the rows as they were given.
-Missing find(const Simulation& simulation, const Inputs& as_given, const MeasuredOutputs& measured,
+Missing find(const Simulation& simulation, const Recording& as_given, const MeasuredOutputs& measured,
              const std::vector<ModelTerm>& terms, MissingOptions options) {
-  options.search.simplest_of_rivals = as_given.instants.size() > 0;
-  const Eigen::MatrixXd simulated = simulation.predict(as_given.values, nominal_values(simulation));
+  options.search.simplest_of_rivals = as_given.is_in_time();
+  const Eigen::MatrixXd& inputs_as_given = as_given.inputs().values;
+  const Eigen::MatrixXd simulated = simulation.predict(inputs_as_given, values_of(simulation.parameters));
   SmoothedInputs smooth = smoothed(as_given, simulated);
   const bool is_smoothed = smooth.change.size() > 0;
   Simulation there = simulation;
   if (is_smoothed) {
     there.predict = [&](const Eigen::MatrixXd&, const Eigen::VectorXd& values) -> Eigen::MatrixXd {
-      return simulation.predict(as_given.values, values) + smooth.change;
+      return simulation.predict(inputs_as_given, values) + smooth.change;
     };
   }
-  smooth.inputs = with_zero_bands(there, std::move(smooth.inputs), measured);
-  SearchedRows rows{.apart = rows_at_rest(smooth.inputs)};
-  const std::vector<std::string> at_rest = notes_on_rest(smooth.inputs);
-  smooth.inputs.zero_bands = bands_of_errors(smooth.inputs);
-  const Inputs& inputs = smooth.inputs;
-  if (inputs.cutoff > 0.0) rows.columns = std::make_shared<ColumnCache>(inputs);
-  for (std::size_t i = 0; i < rows.apart.size(); ++i) rows.apart[i] = rows.apart[i] || smooth.unknown_sign[i];
-  const std::vector<std::string> at_limits =
-      notes_on_limits(rows_at_limits(measured, as_measured(as_given, simulated), rows.apart));
+  const Recording resting = with_rest(there, smooth.recording, measured);
+  const Eigen::MatrixXd as_measured = as_given.as_measured(simulated);
+  std::vector<Apart> apart = rows_apart(ApartWhen::before_searches, {resting, measured, as_measured});
+  smooth.recording = resting.with_zero_bands(bands_of_errors(resting.inputs()));
+  const Recording& recording = smooth.recording;
+  SearchedRows rows{.apart = std::vector<bool>(inputs_as_given.rows(), false)};
+  if (recording.is_filtered()) rows.columns = std::make_shared<ColumnCache>(recording);
+  mark(apart, rows.apart);
+  mark({smooth.unknown_sign}, rows.apart);
   std::set<std::size_t> refuted = terms_of_regimes(terms);
-  Beginning beginning = begin(there, inputs, measured, terms, rows, options, refuted);
+  Beginning beginning = begin(there, recording, measured, terms, rows, options, refuted);
   // The filter of a recording looks like a state whose constants are not those of a machine.
   for (auto beyond = beyond_constants(beginning.missing, terms); !beyond.empty();
        beyond = beyond_constants(beginning.missing, terms)) {
     refuted.insert(beyond.begin(), beyond.end());
-    beginning = begin(there, inputs, measured, terms, rows, options, refuted);
+    beginning = begin(there, recording, measured, terms, rows, options, refuted);
   }
   const SearchedRows& searched = beginning.rows;
   Missing missing = find_at(there, smooth, measured, terms, searched, options, refuted, std::move(beginning.missing));
-  if (inputs.instants.size() > 0 && !missing.held_out.empty()) {
-    const CrossValidation validation(there, inputs, measured, terms, searched, options);
+  if (recording.is_in_time() && !missing.held_out.empty()) {
+    const CrossValidation validation(there, recording, measured, terms, searched, options);
     const auto search = [&](const std::vector<ModelTerm>& others, const std::set<std::size_t>& left_out) {
-      return search_once(there, inputs, measured, others, searched, options, left_out);
+      return search_once(there, recording, measured, others, searched, options, left_out);
     };
     missing = contested(std::move(missing), terms, refuted, validation, search);
   }
-  fit_on_all_rows(there, inputs, measured, terms, searched, options, missing);
-  missing.zero_bands = inputs.zero_bands;
+  fit_on_all_rows(there, recording, measured, terms, searched, options, missing);
+  missing.zero_bands = recording.inputs().zero_bands;
   if (is_smoothed) {
     missing.before -= smooth.change;
-    missing.corrected = as_measured(as_given, corrected(simulation, missing, terms, as_given));
+    missing.corrected = as_given.as_measured(with_found_terms(simulation, missing, terms, as_given));
     missing.change_by_smoothing = smooth.change;
   }
-  missing.notes.insert(missing.notes.begin(), beginning.at_reversals.begin(), beginning.at_reversals.end());
-  missing.notes.insert(missing.notes.begin(), at_rest.begin(), at_rest.end());
-  missing.notes.insert(missing.notes.begin(), at_limits.begin(), at_limits.end());
-  missing.notes.insert(missing.notes.begin(), smooth.notes.begin(), smooth.notes.end());
+  std::ranges::move(beginning.at_reversals, std::back_inserter(apart));
+  std::vector<std::string> notes = smooth.notes;
+  tell(apart, notes);
+  missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
   return missing;
 }
 
 // Of a log with more rows than a search can use, means over few rows are searched.
-Missing find_in_rows(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+Missing find_in_rows(const Simulation& simulation, const Recording& recording, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const MissingOptions& options) {
-  const std::optional<AveragedRows> few = averaged(inputs, measured, options);
-  if (!few) return find(simulation, inputs, measured, terms, options);
-  return of_all_rows(find(averaged(simulation, inputs, few->blocks), few->inputs, few->measured, terms, options), *few,
-                     simulation, terms, inputs);
+  const std::optional<AveragedRows> few = averaged(recording, measured, options);
+  if (!few) return find(simulation, recording, measured, terms, options);
+  const Simulation of_means = averaged(simulation, recording.inputs(), few->blocks);
+  return of_all_rows(find(of_means, few->recording, few->measured, terms, options), *few, simulation, terms, recording);
 }
 
 // Whether what is left is alike in neighbouring rows.
@@ -300,13 +296,13 @@ Missing find_along_rows(const Simulation& simulation, const Inputs& inputs, cons
   const AlongRows rows = is_told ? AlongRows::independent : along_rows(inputs, options);
   Missing missing;
   if (rows != AlongRows::measured_signal) {
-    missing = find_in_rows(simulation, inputs, measured, terms, options);
+    missing = find_in_rows(simulation, Recording(inputs), measured, terms, options);
     if (rows == AlongRows::independent || !is_alike_in_neighbours(measured, missing)) return missing;
   }
   Inputs in_time = inputs;
   in_time.instants =
       Eigen::VectorXd::LinSpaced(inputs.values.rows(), 0.0, static_cast<double>(inputs.values.rows() - 1));
-  missing = find_in_rows(simulation, in_time, measured, terms, options);
+  missing = find_in_rows(simulation, Recording(std::move(in_time)), measured, terms, options);
   missing.time.found_out = true;
   return missing;
 }
@@ -316,7 +312,7 @@ Missing find_along_rows(const Simulation& simulation, const Inputs& inputs, cons
 Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const MissingOptions& options) {
   check(simulation, inputs, measured, options);
-  const auto run = [&] { return simulation.predict(inputs.values, nominal_values(simulation)); };
+  const auto run = [&] { return simulation.predict(inputs.values, values_of(simulation.parameters)); };
   const Eigen::MatrixXd simulated = run();
   // What has the wrong shape is refused by the search.
   if (simulated.rows() == measured.values.rows() && simulated.cols() == measured.values.cols()) {
@@ -333,7 +329,7 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
 
 Eigen::MatrixXd corrected(const Simulation& simulation, const Missing& missing, const std::vector<ModelTerm>& terms,
                           const Inputs& inputs) {
-  return with_found_terms(simulation, missing, terms, inputs);
+  return with_found_terms(simulation, missing, terms, Recording(inputs));
 }
 
 }  // namespace llmt::discovery

@@ -24,9 +24,9 @@ struct Pairing {
 };
 
 // Samples whose noise may be alike are no pair.
-class Apart {
+class Separate {
  public:
-  Apart(const std::vector<Eigen::Index>& stretches, double independent_share)
+  Separate(const std::vector<Eigen::Index>& stretches, double independent_share)
       : stretches_(&stretches), apart_(static_cast<Eigen::Index>(std::ceil(2.0 / independent_share))) {}
 
   bool operator()(Eigen::Index i, Eigen::Index k) const {
@@ -38,7 +38,7 @@ class Apart {
   Eigen::Index apart_;
 };
 
-Pairing along(const Eigen::VectorXd& input, const Eigen::VectorXd& errors, const Apart& apart) {
+Pairing along(const Eigen::VectorXd& input, const Eigen::VectorXd& errors, const Separate& apart) {
   std::vector<Eigen::Index> order(input.size());
   std::iota(order.begin(), order.end(), 0);
   std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return input(i); });
@@ -55,7 +55,7 @@ Pairing along(const Eigen::VectorXd& input, const Eigen::VectorXd& errors, const
 }
 
 // Nearest neighbours; `inputs` scaled to equal spread.
-Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors, const Apart& apart) {
+Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors, const Separate& apart) {
   const Eigen::Index n = inputs.rows();
   std::vector<Eigen::Index> neighbour(n, -1);
   const Eigen::MatrixXd points = inputs.transpose();
@@ -82,7 +82,7 @@ Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors, co
 
 StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors,
                              const std::vector<Eigen::Index>& stretches, double independent_share) {
-  const Apart apart(stretches, independent_share);
+  const Separate apart(stretches, independent_share);
   constexpr Eigen::Index fewest = 20;
   constexpr double most_work = 2e8;  // distances
   StructureLeft best;

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
+#include "discovery/recording/noise.hpp"
+#include "discovery/recording/refuse.hpp"
 #include "discovery/search/workspace.hpp"
-#include "discovery/terms/correlation.hpp"
-#include "discovery/terms/refuse.hpp"
 #include "discovery/terms/term_model.hpp"
 #include "llmt/discovery/least_squares.hpp"
 

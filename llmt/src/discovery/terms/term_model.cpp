@@ -5,9 +5,8 @@
 #include <algorithm>
 #include <numeric>
 
-#include "discovery/terms/refuse.hpp"
+#include "discovery/recording/refuse.hpp"
 #include "llmt/discovery/least_squares.hpp"
-#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 
@@ -17,20 +16,20 @@ Eigen::Index first_bad_row(const Eigen::MatrixXd& values) {
   return row;
 }
 
-TermModel::TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
+TermModel::TermModel(const Simulation& simulation, const Recording& recording, std::vector<std::string> outputs,
                      const std::vector<ModelTerm>& terms, std::set<std::size_t> refuted)
     : simulation_(&simulation),
-      inputs_(&inputs),
+      recording_(&recording),
       outputs_(std::move(outputs)),
       terms_(&terms),
       refuted_(std::move(refuted)),
-      rows_(rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()))) {}
+      rows_(recording.rows()) {}
 
 Eigen::MatrixXd TermModel::evaluate(const Eigen::VectorXd& values) const {
-  Eigen::MatrixXd simulated = simulation_->predict(inputs_->values, values);
-  if (simulated.rows() != inputs_->values.rows() || simulated.cols() != std::ssize(outputs_)) {
+  Eigen::MatrixXd simulated = simulation_->predict(inputs().values, values);
+  if (simulated.rows() != inputs().values.rows() || simulated.cols() != std::ssize(outputs_)) {
     refuse("find_missing", fmt::format("the simulation gave {} x {} outputs, must be {} x {}", simulated.rows(),
-                                       simulated.cols(), inputs_->values.rows(), outputs_.size()));
+                                       simulated.cols(), inputs().values.rows(), outputs_.size()));
   }
   return simulated;
 }
@@ -94,10 +93,10 @@ Eigen::MatrixXd TermModel::predict(const Eigen::VectorXd& values, const std::vec
 }
 
 Eigen::VectorXd TermModel::input(const std::string& name) const {
-  const auto found = std::ranges::find(inputs_->names, name);
-  if (found == inputs_->names.end())
+  const auto found = std::ranges::find(inputs().names, name);
+  if (found == inputs().names.end())
     refuse("find_missing", fmt::format("a term depends on \"{}\", which is not an input", name));
-  return inputs_->values.col(found - inputs_->names.begin());
+  return inputs().values.col(found - inputs().names.begin());
 }
 
 std::string TermModel::label(const PlacedTerm& placed) const {
@@ -153,19 +152,26 @@ Eigen::MatrixXd stacked_signature(const TermModel& model, const TermData& data, 
 }
 
 Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& missing,
-                                 const std::vector<ModelTerm>& terms, const Inputs& elsewhere) {
-  Inputs inputs = elsewhere;
-  if (inputs.zero_bands.size() == 0) inputs.zero_bands = missing.zero_bands;
+                                 const std::vector<ModelTerm>& terms, const Recording& elsewhere) {
+  const bool has_bands = elsewhere.inputs().zero_bands.size() > 0;
+  const Recording recording = has_bands ? elsewhere : elsewhere.with_zero_bands(missing.zero_bands);
   std::vector<std::string> outputs;
   for (const Gap& gap : missing.gaps) outputs.push_back(gap.output);
-  const TermModel model(simulation, inputs, outputs, terms);
-  Eigen::VectorXd values(std::ssize(missing.parameters));
-  for (std::size_t k = 0; k < missing.parameters.size(); ++k) values(k) = missing.parameters[k].value;
+  return TermModel(simulation, recording, outputs, terms).predict(values_of(missing.parameters), placed_terms(missing));
+}
+
+Eigen::VectorXd values_of(const std::vector<Parameter>& parameters) {
+  Eigen::VectorXd values(std::ssize(parameters));
+  for (std::size_t k = 0; k < parameters.size(); ++k) values(static_cast<Eigen::Index>(k)) = parameters[k].value;
+  return values;
+}
+
+std::vector<PlacedTerm> placed_terms(const Missing& missing) {
   std::vector<PlacedTerm> placed;
   for (const FoundTerm& found : missing.found) {
     placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
   }
-  return model.predict(values, placed);
+  return placed;
 }
 
 }  // namespace llmt::discovery

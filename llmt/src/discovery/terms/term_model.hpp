@@ -5,8 +5,8 @@
 #include <set>
 #include <vector>
 
+#include "discovery/recording/samples.hpp"
 #include "discovery/terms/column_cache.hpp"
-#include "discovery/terms/samples.hpp"
 #include "llmt/discovery/missing.hpp"
 #include "llmt/discovery/model_term.hpp"
 
@@ -28,7 +28,8 @@ struct PlacedTerm {
 /// Evaluates on all rows, those set aside included, because terms may depend on the inputs of the row before.
 class TermModel {
  public:
-  TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
+  /// Keeps references.
+  TermModel(const Simulation& simulation, const Recording& recording, std::vector<std::string> outputs,
             const std::vector<ModelTerm>& terms, std::set<std::size_t> refuted = {});
 
   /// Columns that searches share; `draw`: of the errors of the inputs, 0: none.
@@ -56,7 +57,8 @@ class TermModel {
   /// n x d.
   Eigen::MatrixXd predict(const Eigen::VectorXd& values, const std::vector<PlacedTerm>& placed) const;
 
-  const Inputs& inputs() const { return *inputs_; }
+  const Recording& recording() const { return *recording_; }
+  const Inputs& inputs() const { return recording_->inputs(); }
   /// Values of an input. Throws std::invalid_argument if there is none of that name.
   Eigen::VectorXd input(const std::string& name) const;
 
@@ -65,7 +67,7 @@ class TermModel {
 
  private:
   const Simulation* simulation_;
-  const Inputs* inputs_;
+  const Recording* recording_;
   std::vector<std::string> outputs_;
   const std::vector<ModelTerm>* terms_;
   std::set<std::size_t> refuted_;
@@ -112,7 +114,12 @@ TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::Vec
 
 /// What corrected() of llmt/discovery/simulation.hpp returns.
 Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& missing,
-                                 const std::vector<ModelTerm>& terms, const Inputs& inputs);
+                                 const std::vector<ModelTerm>& terms, const Recording& elsewhere);
+
+Eigen::VectorXd values_of(const std::vector<Parameter>& parameters);
+
+/// The terms of an answer.
+std::vector<PlacedTerm> placed_terms(const Missing& missing);
 
 /// Autocorrelation of stacked residuals of samples in time, for each output, see autocorrelation(); d empty lists for
 /// samples that are not in time.

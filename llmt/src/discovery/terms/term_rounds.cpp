@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "discovery/terms/correlation.hpp"
+#include "discovery/recording/noise.hpp"
 #include "discovery/terms/term_question.hpp"
 #include "llmt/discovery/rounds.hpp"
 #include "llmt/discovery/search.hpp"

@@ -1,4 +1,4 @@
-#include "discovery/terms/samples.hpp"
+#include "discovery/recording/samples.hpp"
 
 namespace llmt::discovery {
 

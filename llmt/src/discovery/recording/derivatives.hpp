@@ -1,4 +1,4 @@
-// Derivatives of signals by time.
+// Derivatives of signals by time, and inputs that are derivatives of each other.
 #pragma once
 
 #include <Eigen/Core>
@@ -53,10 +53,24 @@ class Derivatives {
   Eigen::VectorXd apply(int order, const Eigen::VectorXd& values) const;
 };
 
-/// The places in time by which no smooth signal changes much: the longest lag l at which
-/// mean (v_(i+l) - v_i)^2 / 2, without the noise, is at most 18 % of the variance of every smooth column (for a sine of
-/// period P: l = 0.1 P); at least 2. A column whose noise (third differences) is more than 40 % of its variance is not
-/// smooth.
-Eigen::Index smooth_lag(const Rows& rows, const Eigen::MatrixXd& signals);
+/// Derivatives of signals are those of polynomials over so many lags (see smooth_lag()) to both sides.
+inline constexpr Eigen::Index lags_of_a_window = 2;
+/// Fewer rows have no derivatives to speak of.
+inline constexpr Eigen::Index fewest_for_derivatives = 60;
+/// Times that differ by less, relative to a window or a step, are the same.
+inline constexpr double same_time = 1e-7;
+
+struct Motion {
+  Eigen::Index position = 0;  ///< columns of the inputs
+  Eigen::Index speed = 0;
+  Eigen::Index acceleration = 0;
+  double second = 1.0;  ///< in units of the instants
+};
+
+/// Found by comparing derivatives of the inputs with the other inputs.
+std::vector<Motion> motions(const Derivatives& derivatives, const Inputs& inputs);
+
+/// Whether an input is the first or second derivative by time of an output (n values).
+bool is_derivative_of(const Derivatives& derivatives, const Eigen::VectorXd& input, const Eigen::VectorXd& output);
 
 }  // namespace llmt::discovery

@@ -1,4 +1,4 @@
-#include "discovery/terms/motion.hpp"
+#include "discovery/recording/motion.hpp"
 
 #include <fmt/format.h>
 
@@ -8,25 +8,8 @@
 #include <cmath>
 #include <optional>
 
-#include "discovery/terms/input_noise.hpp"
-#include "discovery/terms/surrogate.hpp"
-#include "llmt/discovery/terms.hpp"
-
 namespace llmt::discovery {
 namespace {
-
-// Share of the variance of b that the derivative of a explains, and the time unit of b in that of the instants.
-struct Likeness {
-  double share = 0.0;
-  double unit = 0.0;
-};
-
-Likeness likeness(const Eigen::VectorXd& derivative, const Eigen::VectorXd& b) {
-  const double own = derivative.squaredNorm() * b.squaredNorm();
-  const double common = derivative.dot(b);
-  if (!(own > 0.0) || !(common > 0.0)) return {};
-  return {common * common / own, b.squaredNorm() / common};
-}
 
 // The linear map from position, speed and acceleration at the rows of a window to the speed at one of them.
 class LocalSpeed {
@@ -98,8 +81,8 @@ void smooth_speed(const Rows& rows, const Eigen::MatrixXd& motion, const Eigen::
       times(i - begin) = (rows.instants(rows.sequence[i]) - rows.instants(row)) / second;
       window.row(i - begin) = motion.row(rows.sequence[i]).cwiseQuotient(errors.matrix().transpose());
     }
-    constexpr double same = 1e-7;
-    if (before.size() != times.size() || (before - times).cwiseAbs().maxCoeff() > same * times.cwiseAbs().maxCoeff()) {
+    if (before.size() != times.size() ||
+        (before - times).cwiseAbs().maxCoeff() > same_time * times.cwiseAbs().maxCoeff()) {
       local.emplace(times, errors);
       before = times;
     }
@@ -147,63 +130,25 @@ Speed smooth_speed(const Rows& rows, const Eigen::MatrixXd& motion, const Eigen:
 
 }  // namespace
 
-std::vector<Motion> motions(const Derivatives& derivatives, const Inputs& inputs) {
-  constexpr double of_speeds = 0.9;
-  constexpr double of_accelerations = 0.7;  // they are noisier
-  constexpr double unlike_units = 1.5;
-  const Eigen::Index p = inputs.values.cols();
-  std::vector<Eigen::VectorXd> first;
-  for (Eigen::Index j = 0; j < p; ++j) first.push_back(derivatives.first(inputs.values.col(j)));
-  const auto successor = [&](Eigen::Index a, double least) -> std::pair<Eigen::Index, Likeness> {
-    std::pair<Eigen::Index, Likeness> best{-1, {}};
-    for (Eigen::Index b = 0; b < p; ++b) {
-      if (b == a || inputs.names[b] == inputs.order) continue;
-      const Likeness own = likeness(first[a], inputs.values.col(b));
-      if (own.share >= least && own.share > best.second.share) best = {b, own};
-    }
-    return best;
-  };
-  std::vector<Motion> all;
-  for (Eigen::Index a = 0; a < p; ++a) {
-    if (inputs.names[a] == inputs.order) continue;
-    const auto [b, speed] = successor(a, of_speeds);
-    if (b < 0) continue;
-    const auto [c, acceleration] = successor(b, of_accelerations);
-    if (c < 0 || c == a) continue;
-    const double ratio = speed.unit / acceleration.unit;
-    if (ratio < 1.0 / unlike_units || ratio > unlike_units) continue;
-    all.push_back({a, b, c, speed.unit});
-  }
-  return all;
-}
-
-bool is_derivative_of(const Derivatives& derivatives, const Eigen::VectorXd& input, const Eigen::VectorXd& output) {
-  constexpr double alike = 0.8;
-  return likeness(derivatives.first(output), input).share >= alike ||
-         likeness(derivatives.second(output), input).share >= alike;
-}
-
-SmoothedInputs smoothed(const Inputs& inputs, const Eigen::MatrixXd& simulated) {
+SmoothedInputs smoothed(const Recording& recording, const Eigen::MatrixXd& simulated) {
+  const Inputs& inputs = recording.inputs();
   const Eigen::Index n = inputs.values.rows();
-  SmoothedInputs result{.inputs = inputs,
+  SmoothedInputs result{.recording = recording,
                         .errors = Eigen::VectorXd::Zero(inputs.values.cols()),
                         .change = {},
-                        .unknown_sign = std::vector<bool>(n, false),
+                        .unknown_sign = {{}, ApartReason::unknown_sign, {}},
                         .notes = {}};
-  constexpr Eigen::Index fewest = 60;
   // What has the wrong shape is refused by the search.
   // Speeds of one filter are as good as they get.
-  if (inputs.instants.size() == 0 || inputs.cutoff > 0.0 || n < fewest || simulated.rows() != n ||
+  if (!recording.is_in_time() || recording.is_filtered() || n < fewest_for_derivatives || simulated.rows() != n ||
       !simulated.allFinite())
     return result;
-  const Surrogate surrogate(inputs.values, simulated);
-  constexpr double described = 0.98;
-  if (surrogate.described().minCoeff() < described) return result;
-  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(n));
-  const Eigen::MatrixXd covariance = covariance_of_errors(rows, inputs);
-  const Eigen::Index lag = smooth_lag(rows, inputs.values);
-  constexpr Eigen::Index lags = 2;
-  for (const Motion& motion : motions(Derivatives(rows, lags * lag), inputs)) {
+  const std::shared_ptr<const Surrogate> surrogate = recording.surrogate(simulated);
+  if (surrogate->described().minCoeff() < well_described) return result;
+  const Eigen::MatrixXd& covariance = recording.covariance();
+  Inputs better_inputs = inputs;
+  std::vector<bool> unknown_sign(n, false);
+  for (const Motion& motion : recording.axes()) {
     const std::array<Eigen::Index, 3> columns = {motion.position, motion.speed, motion.acceleration};
     Eigen::MatrixXd own(n, 3);
     Eigen::Array3d errors;
@@ -214,7 +159,7 @@ SmoothedInputs smoothed(const Inputs& inputs, const Eigen::MatrixXd& simulated) 
       const double spread = std::sqrt((own.col(k).array() - own.col(k).mean()).square().mean());
       errors(k) = std::max(std::sqrt(covariance(columns[k], columns[k])), digits * spread);
     }
-    const Speed better = smooth_speed(rows, own, errors, motion.second, lag);
+    const Speed better = smooth_speed(recording.rows(), own, errors, motion.second, recording.lag());
     constexpr double a_third = 1.0 / 3.0;
     constexpr double more = 1.1;
     const double taken_off = std::sqrt((better.values - own.col(1)).squaredNorm() / static_cast<double>(n));
@@ -224,18 +169,22 @@ SmoothedInputs smoothed(const Inputs& inputs, const Eigen::MatrixXd& simulated) 
         rough > most_rough * static_cast<double>(n)) {
       continue;
     }
-    constexpr double unknown = 3.0;
     for (Eigen::Index i = 0; i < n; ++i) {
-      if (!better.is_smooth[i] && std::abs(own(i, 1)) < unknown * errors(1)) result.unknown_sign[i] = true;
+      if (!better.is_smooth[i] && std::abs(own(i, 1)) < sign_is_known * errors(1)) unknown_sign[i] = true;
     }
-    result.inputs.values.col(motion.speed) = better.values;
+    better_inputs.values.col(motion.speed) = better.values;
     result.errors(motion.speed) = errors(1);
-    if (result.inputs.noise.size() > 0) result.inputs.noise(motion.speed) = better.error;
+    if (better_inputs.noise.size() > 0) better_inputs.noise(motion.speed) = better.error;
     result.notes.push_back(fmt::format(
         "{} was smoothed, as the derivative of {} by time: standard deviation of its errors {:.2g} -> {:.2g}",
         inputs.names[motion.speed], inputs.names[motion.position], errors(1), better.error));
   }
-  if (!result.notes.empty()) result.change = surrogate.predict(result.inputs.values) - surrogate.predict(inputs.values);
+  if (result.notes.empty()) return result;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (unknown_sign[i]) result.unknown_sign.rows.push_back(i);
+  }
+  result.change = surrogate->predict(better_inputs.values) - surrogate->predict(inputs.values);
+  result.recording = Recording(std::move(better_inputs));
   return result;
 }
 

@@ -1,10 +1,27 @@
-#include "discovery/terms/derivatives.hpp"
+#include "discovery/recording/derivatives.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace llmt::discovery {
+namespace {
+
+// Share of the variance of b that the derivative of a explains, and the time unit of b in that of the instants.
+struct Likeness {
+  double share = 0.0;
+  double unit = 0.0;
+};
+
+Likeness likeness(const Eigen::VectorXd& derivative, const Eigen::VectorXd& b) {
+  const double own = derivative.squaredNorm() * b.squaredNorm();
+  const double common = derivative.dot(b);
+  if (!(own > 0.0) || !(common > 0.0)) return {};
+  return {common * common / own, b.squaredNorm() / common};
+}
+
+}  // namespace
 
 double median_step(const Rows& rows) {
   std::vector<double> steps;
@@ -53,8 +70,7 @@ Derivatives::Derivatives(const Rows& rows, Eigen::Index half)
     }
     const double width = times.cwiseAbs().maxCoeff();
     times /= width;
-    constexpr double same = 1e-7;
-    if (before.size() != times.size() || (before - times).cwiseAbs().maxCoeff() > same) {
+    if (before.size() != times.size() || (before - times).cwiseAbs().maxCoeff() > same_time) {
       Eigen::MatrixXd basis = Eigen::MatrixXd::Ones(times.size(), powers);
       for (Eigen::Index q = 1; q < powers; ++q) basis.col(q) = basis.col(q - 1).cwiseProduct(times);
       // Times within -1 ... 1 and few powers: the normal equations lose few digits.
@@ -109,27 +125,40 @@ Eigen::VectorXd Derivatives::earlier(const Eigen::VectorXd& values, double by) c
   return result;
 }
 
-Eigen::Index smooth_lag(const Rows& rows, const Eigen::MatrixXd& signals) {
-  constexpr double largest_noise_share = 0.4;
-  constexpr double largest_change = 0.18;
-  constexpr Eigen::Index least = 2;
-  const auto n = std::ssize(rows.sequence);
-  Eigen::Index lag = n / 20;
-  for (Eigen::Index j = 0; j < signals.cols(); ++j) {
-    if (n < 8) return least;
-    const Eigen::ArrayXd v = Eigen::VectorXd(signals.col(j))(rows.sequence).array();
-    const double variance = (v - v.mean()).square().mean();
-    const Eigen::ArrayXd third = v.tail(n - 3) - 3.0 * v.segment(2, n - 3) + 3.0 * v.segment(1, n - 3) - v.head(n - 3);
-    const double noise = third.square().mean() / 20.0;
-    if (!(variance > 0.0) || noise > largest_noise_share * variance) continue;
-    Eigen::Index own = 1;
-    while (own < lag && 0.5 * (v.tail(n - own - 1) - v.head(n - own - 1)).square().mean() - noise <=
-                            largest_change * (variance - noise)) {
-      ++own;
+std::vector<Motion> motions(const Derivatives& derivatives, const Inputs& inputs) {
+  constexpr double of_speeds = 0.9;
+  constexpr double of_accelerations = 0.7;  // they are noisier
+  constexpr double unlike_units = 1.5;
+  const Eigen::Index p = inputs.values.cols();
+  std::vector<Eigen::VectorXd> first;
+  for (Eigen::Index j = 0; j < p; ++j) first.push_back(derivatives.first(inputs.values.col(j)));
+  const auto successor = [&](Eigen::Index a, double least) -> std::pair<Eigen::Index, Likeness> {
+    std::pair<Eigen::Index, Likeness> best{-1, {}};
+    for (Eigen::Index b = 0; b < p; ++b) {
+      if (b == a || inputs.names[b] == inputs.order) continue;
+      const Likeness own = likeness(first[a], inputs.values.col(b));
+      if (own.share >= least && own.share > best.second.share) best = {b, own};
     }
-    lag = own;
+    return best;
+  };
+  std::vector<Motion> all;
+  for (Eigen::Index a = 0; a < p; ++a) {
+    if (inputs.names[a] == inputs.order) continue;
+    const auto [b, speed] = successor(a, of_speeds);
+    if (b < 0) continue;
+    const auto [c, acceleration] = successor(b, of_accelerations);
+    if (c < 0 || c == a) continue;
+    const double ratio = speed.unit / acceleration.unit;
+    if (ratio < 1.0 / unlike_units || ratio > unlike_units) continue;
+    all.push_back({a, b, c, speed.unit});
   }
-  return std::max(least, lag);
+  return all;
+}
+
+bool is_derivative_of(const Derivatives& derivatives, const Eigen::VectorXd& input, const Eigen::VectorXd& output) {
+  constexpr double alike = 0.8;
+  return likeness(derivatives.first(output), input).share >= alike ||
+         likeness(derivatives.second(output), input).share >= alike;
 }
 
 }  // namespace llmt::discovery

@@ -1,4 +1,4 @@
-#include "discovery/terms/row_split.hpp"
+#include "discovery/recording/row_split.hpp"
 
 #include <fmt/format.h>
 
@@ -8,15 +8,11 @@
 #include <map>
 #include <numeric>
 
-#include "discovery/terms/refuse.hpp"
-#include "discovery/terms/row_filter.hpp"
+#include "discovery/recording/refuse.hpp"
 #include "llmt/random.hpp"
 
 namespace llmt::discovery {
 namespace {
-
-// A signal whose noise is a larger share of its variance is not smooth: its neighbours say nothing of it.
-constexpr double largest_noise_share = 0.4;
 
 std::vector<Eigen::Index> repeat_numbers(const Inputs& inputs) {
   std::map<std::vector<double>, Eigen::Index> numbers;
@@ -31,86 +27,6 @@ std::vector<Eigen::Index> repeat_numbers(const Inputs& inputs) {
     repeats.push_back(numbers.try_emplace(std::move(setting), std::ssize(numbers)).first->second);
   }
   return repeats;
-}
-
-// Rows in the order of time.
-using Piece = std::vector<Eigen::Index>;
-
-// Runs, cut where the recording was interrupted.
-struct Recording {
-  std::vector<Piece> pieces;
-  std::vector<Eigen::Index> runs;  // of every piece
-  double step = 0.0;
-};
-
-Recording recording_of(const Inputs& inputs) {
-  const Eigen::Index n = inputs.values.rows();
-  const Eigen::VectorXd& instants = inputs.instants;
-  const auto run = [&](Eigen::Index i) { return inputs.runs.empty() ? Eigen::Index{0} : inputs.runs[i]; };
-  Piece order(n);
-  std::iota(order.begin(), order.end(), Eigen::Index{0});
-  std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return std::pair(run(i), instants(i)); });
-  std::vector<double> steps;
-  for (Eigen::Index k = 1; k < n; ++k) {
-    if (run(order[k]) != run(order[k - 1])) continue;
-    const double step = instants(order[k]) - instants(order[k - 1]);
-    if (!(step > 0.0)) {
-      refuse("find_missing", fmt::format("rows {} and {} were taken at the same time, {}", order[k - 1] + 1,
-                                         order[k] + 1, instants(order[k])));
-    }
-    steps.push_back(step);
-  }
-  Recording recording;
-  if (steps.empty()) refuse("find_missing", "no run has two rows");
-  std::ranges::nth_element(steps, steps.begin() + std::ssize(steps) / 2);
-  recording.step = steps[steps.size() / 2];
-  constexpr double interruption = 3.0;  // steps
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const bool goes_on = k > 0 && run(order[k]) == run(order[k - 1]) &&
-                         instants(order[k]) - instants(order[k - 1]) <= interruption * recording.step;
-    if (!goes_on) {
-      recording.pieces.emplace_back();
-      recording.runs.push_back(run(order[k]));
-    }
-    recording.pieces.back().push_back(order[k]);
-  }
-  return recording;
-}
-
-double variance_of(const Eigen::VectorXd& values) {
-  return values.size() < 2 ? 0.0 : (values.array() - values.mean()).square().mean();
-}
-
-// Mean over the pieces, weighted by rows; NaN where no piece is long enough.
-double noise_variance_in(const std::vector<Piece>& pieces, const Eigen::VectorXd& values) {
-  double sum = 0.0;
-  double weight = 0.0;
-  for (const Piece& piece : pieces) {
-    const double own = noise_variance(values(piece));
-    if (std::isnan(own)) continue;
-    sum += own * static_cast<double>(piece.size());
-    weight += static_cast<double>(piece.size());
-  }
-  return weight > 0.0 ? sum / weight : std::numeric_limits<double>::quiet_NaN();
-}
-
-// The variance of a signal and of its noise.
-struct Smoothness {
-  Eigen::Index column = 0;
-  double variance = 0.0;
-  double noise = 0.0;
-
-  bool is_smooth() const { return noise <= largest_noise_share * variance; }
-};
-
-std::vector<Smoothness> smoothness_of(const std::vector<Piece>& pieces, const Inputs& inputs) {
-  std::vector<Smoothness> all;
-  for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
-    const Eigen::VectorXd values = inputs.values.col(j);
-    const Smoothness own{j, variance_of(values), noise_variance_in(pieces, values)};
-    if (own.variance > 0.0 && !std::isnan(own.noise)) all.push_back(own);
-  }
-  return all;
 }
 
 // Mean variance within blocks of `length` rows.
@@ -128,17 +44,18 @@ double variance_within(const std::vector<Piece>& pieces, const Eigen::VectorXd& 
 }
 
 // The longest block that the inputs bear; 1 where most of them are not smooth.
-Eigen::Index longest_block(const std::vector<Piece>& pieces, const Inputs& inputs, Eigen::Index fewest_samples) {
+Eigen::Index longest_block(const Recording& recording, Eigen::Index fewest_samples) {
   constexpr double largest_loss = 0.03;
-  const auto n = static_cast<Eigen::Index>(inputs.values.rows());
-  std::vector<Smoothness> signals = smoothness_of(pieces, inputs);
-  const auto smooth = std::ranges::count_if(signals, &Smoothness::is_smooth);
+  const Eigen::MatrixXd& values = recording.inputs().values;
+  const Eigen::Index n = values.rows();
+  std::vector<Signal> signals = recording.signals();
+  const auto smooth = std::ranges::count_if(signals, &Signal::is_smooth);
   if (2 * smooth < std::ssize(signals) || signals.empty()) return 1;
-  std::erase_if(signals, [](const Smoothness& signal) { return !signal.is_smooth(); });
+  std::erase_if(signals, [](const Signal& signal) { return !signal.is_smooth(); });
   Eigen::Index length = 1;
   const auto bears = [&](Eigen::Index trial) {
-    return std::ranges::all_of(signals, [&](const Smoothness& signal) {
-      const double within = variance_within(pieces, inputs.values.col(signal.column), trial);
+    return std::ranges::all_of(signals, [&](const Signal& signal) {
+      const double within = variance_within(recording.pieces().rows, values.col(signal.column), trial);
       const double share_of_noise = static_cast<double>(trial - 1) / static_cast<double>(trial);
       return within - share_of_noise * signal.noise <= largest_loss * (signal.variance - signal.noise);
     });
@@ -151,10 +68,9 @@ Eigen::Index longest_block(const std::vector<Piece>& pieces, const Inputs& input
   return length;
 }
 
-Eigen::Index block_length(const std::vector<Piece>& pieces, const Inputs& inputs, const MissingOptions& options,
-                          Eigen::Index fewest_samples) {
-  const Eigen::Index needed = (inputs.values.rows() + options.largest_sample - 1) / options.largest_sample;
-  return std::max(needed, longest_block(pieces, inputs, fewest_samples));
+Eigen::Index block_length(const Recording& recording, const MissingOptions& options, Eigen::Index fewest_samples) {
+  const Eigen::Index needed = (recording.inputs().values.rows() + options.largest_sample - 1) / options.largest_sample;
+  return std::max(needed, longest_block(recording, fewest_samples));
 }
 
 // Consecutive rows of a piece that are searched or set aside together.
@@ -164,9 +80,9 @@ struct Segment {
   bool is_held_out = false;
 };
 
-std::vector<Segment> segments_of(const Recording& recording, Eigen::Index block, const MissingOptions& options) {
+std::vector<Segment> segments_of(const Pieces& pieces, Eigen::Index block, const MissingOptions& options) {
   std::vector<Segment> segments;
-  std::vector<Eigen::Index> runs = recording.runs;
+  std::vector<Eigen::Index> runs = pieces.runs;
   std::ranges::sort(runs);
   runs.erase(std::unique(runs.begin(), runs.end()), runs.end());
   Random random(options.seed);
@@ -177,18 +93,18 @@ std::vector<Segment> segments_of(const Recording& recording, Eigen::Index block,
     for (const Eigen::Index k : random.permutation(std::ssize(runs))) {
       if (chosen.size() < aside) chosen.push_back(runs[k]);
     }
-    for (std::size_t p = 0; p < recording.pieces.size(); ++p) {
-      segments.push_back({recording.pieces[p], p, std::ranges::find(chosen, recording.runs[p]) != chosen.end()});
+    for (std::size_t p = 0; p < pieces.rows.size(); ++p) {
+      segments.push_back({pieces.rows[p], p, std::ranges::find(chosen, pieces.runs[p]) != chosen.end()});
     }
     return segments;
   }
   Eigen::Index n = 0;
-  for (const Piece& piece : recording.pieces) n += std::ssize(piece);
+  for (const Piece& piece : pieces.rows) n += std::ssize(piece);
   constexpr Eigen::Index most = 25;
   constexpr Eigen::Index fewest_blocks = 4;  // in a segment
   const Eigen::Index length = std::max({Eigen::Index{1}, (n + most - 1) / most, fewest_blocks * block});
-  for (std::size_t p = 0; p < recording.pieces.size(); ++p) {
-    const Piece& piece = recording.pieces[p];
+  for (std::size_t p = 0; p < pieces.rows.size(); ++p) {
+    const Piece& piece = pieces.rows[p];
     const Eigen::Index parts = std::max<Eigen::Index>(1, std::ssize(piece) / length);
     for (Eigen::Index k = 0; k < parts; ++k) {
       const auto begin = piece.begin() + k * std::ssize(piece) / parts;
@@ -204,29 +120,15 @@ std::vector<Segment> segments_of(const Recording& recording, Eigen::Index block,
 
 }  // namespace
 
-double noise_variance(const Eigen::VectorXd& values) {
-  const Eigen::Index n = values.size();
-  if (n < 4) return std::numeric_limits<double>::quiet_NaN();
-  const Eigen::ArrayXd third = values.tail(n - 3).array() - 3.0 * values.segment(2, n - 3).array() +
-                               3.0 * values.segment(1, n - 3).array() - values.head(n - 3).array();
-  return third.square().mean() / 20.0;
-}
-
-bool is_smooth_in_time(const Inputs& inputs, Eigen::Index column) {
-  const Eigen::VectorXd values = inputs.values.col(column);
-  const Smoothness own{column, variance_of(values), noise_variance_in(recording_of(inputs).pieces, values)};
-  return own.variance > 0.0 && own.is_smooth();
-}
-
 AlongRows along_rows(const Inputs& inputs, const MissingOptions& options) {
   Piece all(inputs.values.rows());
   std::iota(all.begin(), all.end(), Eigen::Index{0});
-  const std::vector<Smoothness> signals = smoothness_of({all}, inputs);
-  const auto smooth = std::ranges::count_if(signals, &Smoothness::is_smooth);
+  const std::vector<Signal> signals = signals_of({all}, inputs.values);
+  const auto smooth = std::ranges::count_if(signals, &Signal::is_smooth);
   if (signals.empty() || 2 * smooth < std::ssize(signals)) return AlongRows::independent;
   // Settings that somebody chose have no noise; third differences of a signal of 30 rows a period are 1e-5 of it.
   constexpr double visible = 1e-5;
-  const auto is_noisy = [](const Smoothness& signal) {
+  const auto is_noisy = [](const Signal& signal) {
     return signal.is_smooth() && signal.noise > visible * signal.variance;
   };
   const bool is_log = std::ranges::any_of(signals, is_noisy) || std::ssize(all) > options.largest_sample;
@@ -258,13 +160,13 @@ RowSplit split_independent(const Inputs& inputs, const MissingOptions& options) 
   return split;
 }
 
-Eigen::Index bearable_block(const Inputs& inputs, const MissingOptions& options) {
-  return longest_block(recording_of(inputs).pieces, inputs, options.largest_sample);
+Eigen::Index bearable_block(const Recording& recording, const MissingOptions& options) {
+  return longest_block(recording, options.largest_sample);
 }
 
-Samples blocks_in_time(const Inputs& inputs, Eigen::Index length) {
+Samples blocks_in_time(const Recording& recording, Eigen::Index length) {
   Samples blocks;
-  for (const Piece& piece : recording_of(inputs).pieces) {
+  for (const Piece& piece : recording.pieces().rows) {
     const Eigen::Index n = std::ssize(piece);
     const Eigen::Index count = std::max<Eigen::Index>(1, n / length);
     for (Eigen::Index b = 0; b < count; ++b) {
@@ -278,17 +180,16 @@ Samples blocks_in_time(const Inputs& inputs, Eigen::Index length) {
 namespace {
 
 // Samples as far apart as their noise is independent, each with what is computed around it.
-RowSplit split_filtered(const Inputs& inputs, const MissingOptions& options) {
-  const RowFilter filter(inputs);
-  Recording recording = recording_of(inputs);
+RowSplit split_filtered(const Recording& recording, const MissingOptions& options) {
+  const RowFilter& filter = recording.filter();
+  const Inputs& inputs = recording.inputs();
+  Pieces pieces{.rows = filter.pieces(), .runs = {}, .step = recording.pieces().step};
   std::vector<std::pair<std::size_t, Eigen::Index>> places(inputs.values.rows());  // piece, place in it
-  recording.runs.clear();
   for (std::size_t p = 0; p < filter.pieces().size(); ++p) {
     const Piece& piece = filter.pieces()[p];
-    recording.runs.push_back(inputs.runs.empty() ? Eigen::Index{0} : inputs.runs[piece.front()]);
+    pieces.runs.push_back(inputs.runs.empty() ? Eigen::Index{0} : inputs.runs[piece.front()]);
     for (Eigen::Index k = 0; k < std::ssize(piece); ++k) places[piece[k]] = {p, k};
   }
-  recording.pieces = filter.pieces();
   RowSplit split;
   split.searched.set_crossings(filter.crossings());
   split.held_out.set_crossings(filter.crossings());
@@ -296,7 +197,7 @@ RowSplit split_filtered(const Inputs& inputs, const MissingOptions& options) {
   const Eigen::Index half = filter.weights().size() / 2;
   Eigen::Index stretch = -1;
   const Segment* before = nullptr;
-  const std::vector<Segment> segments = segments_of(recording, filter.stride(), options);
+  const std::vector<Segment> segments = segments_of(pieces, filter.stride(), options);
   for (const Segment& segment : segments) {
     const bool goes_on = before != nullptr && before->piece == segment.piece && !before->is_held_out;
     if (!segment.is_held_out && !goes_on) ++stretch;
@@ -322,15 +223,14 @@ RowSplit split_filtered(const Inputs& inputs, const MissingOptions& options) {
 
 }  // namespace
 
-RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options, Eigen::Index fewest_samples) {
-  if (inputs.cutoff > 0.0) return split_filtered(inputs, options);
-  const Recording recording = recording_of(inputs);
+RowSplit split_in_time(const Recording& recording, const MissingOptions& options, Eigen::Index fewest_samples) {
+  if (recording.is_filtered()) return split_filtered(recording, options);
   RowSplit split;
-  split.step = recording.step;
-  split.rows_per_sample = block_length(recording.pieces, inputs, options, fewest_samples);
+  split.step = recording.pieces().step;
+  split.rows_per_sample = block_length(recording, options, fewest_samples);
   Eigen::Index stretch = -1;
   const Segment* before = nullptr;
-  const std::vector<Segment> segments = segments_of(recording, split.rows_per_sample, options);
+  const std::vector<Segment> segments = segments_of(recording.pieces(), split.rows_per_sample, options);
   for (const Segment& segment : segments) {
     const bool goes_on = before != nullptr && before->piece == segment.piece && !before->is_held_out;
     if (!segment.is_held_out && !goes_on) ++stretch;
@@ -345,6 +245,48 @@ RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options, Eige
     before = &segment;
   }
   return split;
+}
+
+namespace {
+
+void keep(const Samples& from, const std::vector<bool>& apart, Samples& to, std::vector<bool>& kept) {
+  for (Eigen::Index i = 0; i < from.size(); ++i) {
+    if (from.is_filtered()) {
+      // Next to nothing of what is set apart may be in what is computed.
+      constexpr double negligible = 0.02;
+      double share = 0.0;
+      for (Eigen::Index k = 0; k < from.weights().size(); ++k) {
+        if (apart[from.around(i)[k]]) share += std::abs(from.weights()(k));
+      }
+      kept.push_back(!apart[from.rows_of(i).front()] && share <= negligible);
+      if (kept.back()) to.add(from, i);
+      continue;
+    }
+    const std::span<const Eigen::Index> all = from.rows_of(i);
+    std::vector<Eigen::Index> left;
+    std::ranges::copy_if(all, std::back_inserter(left), [&](Eigen::Index row) { return !apart[row]; });
+    kept.push_back(2 * left.size() >= all.size() && !left.empty());
+    if (kept.back()) to.add(left);
+  }
+}
+
+}  // namespace
+
+RowSplit without_rows(const RowSplit& split, const std::vector<bool>& apart) {
+  RowSplit result = split;
+  result.searched = {};
+  result.held_out = {};
+  result.repeats.clear();
+  result.stretches.clear();
+  std::vector<bool> kept;
+  keep(split.searched, apart, result.searched, kept);
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    if (!kept[i]) continue;
+    if (!split.repeats.empty()) result.repeats.push_back(split.repeats[i]);
+    if (!split.stretches.empty()) result.stretches.push_back(split.stretches[i]);
+  }
+  keep(split.held_out, apart, result.held_out, kept);
+  return result;
 }
 
 }  // namespace llmt::discovery

@@ -1,14 +1,14 @@
-#include "discovery/terms/row_filter.hpp"
+#include "discovery/recording/row_filter.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
+#include "discovery/recording/derivatives.hpp"
+#include "discovery/recording/refuse.hpp"
 #include "discovery/signals/kernel.hpp"
-#include "discovery/terms/derivatives.hpp"
-#include "discovery/terms/refuse.hpp"
-#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -31,8 +31,7 @@ std::vector<Crossing> crossings_of(const Eigen::MatrixXd& inputs,
 
 }  // namespace
 
-RowFilter::RowFilter(const Inputs& inputs) {
-  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
+RowFilter::RowFilter(const Rows& rows, const Eigen::MatrixXd& inputs, double cutoff) {
   step_ = median_step(rows);
   constexpr double uneven = 0.5;  // steps
   for (std::size_t k = 0; k < rows.sequence.size(); ++k) {
@@ -40,15 +39,15 @@ RowFilter::RowFilter(const Inputs& inputs) {
     if (k == 0 || !(std::abs(step - step_) < uneven * step_)) pieces_.emplace_back();
     pieces_.back().push_back(rows.sequence[k]);
   }
-  stride_ = step_ > 0.0 ? independent_step(inputs.cutoff, step_) : 1;
+  stride_ = step_ > 0.0 ? independent_step(cutoff, step_) : 1;
   if (stride_ < 2) {
     refuse("find_missing",
            fmt::format("rows are {:.4g} apart, too far to filter the simulation at {:.4g} per unit of time "
                        "as the measured outputs were",
-                       step_, inputs.cutoff));
+                       step_, cutoff));
   }
-  weights_ = low_pass(inputs.cutoff, step_);
-  crossings_ = std::make_shared<const std::vector<Crossing>>(crossings_of(inputs.values, pieces_));
+  weights_ = low_pass(cutoff, step_);
+  crossings_ = std::make_shared<const std::vector<Crossing>>(crossings_of(inputs, pieces_));
 }
 
 Eigen::MatrixXd RowFilter::operator()(const Eigen::MatrixXd& of_rows) const {
@@ -68,35 +67,31 @@ Eigen::MatrixXd RowFilter::operator()(const Eigen::MatrixXd& of_rows) const {
   return filtered;
 }
 
-Eigen::MatrixXd squared_errors_of_steps(const Inputs& inputs, const Eigen::MatrixXd& of_rows) {
+ErrorsOfSteps::ErrorsOfSteps(const RowFilter& filter, const Rows& rows, const Eigen::MatrixXd& inputs, double cutoff) {
   constexpr Eigen::Index fewest = 4;  // rows in an independent one, of which half are left
-  constexpr double order = 3.0;       // 2^2 - 1
-  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(of_rows.rows(), of_rows.cols());
-  const RowFilter filter(inputs);
-  if (filter.stride() < fewest) return squares;
-  std::vector<Eigen::Index> kept;
-  std::vector<Eigen::Index> next;  // the row left out after it, or itself
+  if (filter.stride() < fewest) return;
   for (const std::vector<Eigen::Index>& piece : filter.pieces()) {
     for (std::size_t k = 0; k < piece.size(); k += 2) {
-      kept.push_back(piece[k]);
-      next.push_back(piece[std::min(k + 1, piece.size() - 1)]);
+      kept_.push_back(piece[k]);
+      next_.push_back(piece[std::min(k + 1, piece.size() - 1)]);
     }
   }
-  Inputs half = inputs;
-  half.values = inputs.values(kept, Eigen::all);
-  half.instants = inputs.instants(kept);
-  half.runs.clear();
-  for (const Eigen::Index row : kept) {
-    if (!inputs.runs.empty()) half.runs.push_back(inputs.runs[row]);
-  }
-  const Eigen::MatrixXd change = filter(of_rows)(kept, Eigen::all) - RowFilter(half)(of_rows(kept, Eigen::all));
-  squares(kept, Eigen::all) = (change / order).cwiseAbs2();
-  squares(next, Eigen::all) = squares(kept, Eigen::all).eval();
-  return squares;
+  Rows half{.inputs = {},
+            .simulated = {},
+            .sequence = std::vector<Eigen::Index>(kept_.size()),
+            .instants = rows.instants(kept_)};
+  std::iota(half.sequence.begin(), half.sequence.end(), Eigen::Index{0});
+  of_kept_.emplace(half, inputs(kept_, Eigen::all), cutoff);
 }
 
-Eigen::MatrixXd as_measured(const Inputs& inputs, const Eigen::MatrixXd& of_rows) {
-  return inputs.cutoff > 0.0 ? RowFilter(inputs)(of_rows) : of_rows;
+Eigen::MatrixXd ErrorsOfSteps::squares(const RowFilter& filter, const Eigen::MatrixXd& of_rows) const {
+  constexpr double order = 3.0;  // 2^2 - 1
+  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(of_rows.rows(), of_rows.cols());
+  if (!of_kept_) return squares;
+  const Eigen::MatrixXd change = filter(of_rows)(kept_, Eigen::all) - (*of_kept_)(of_rows(kept_, Eigen::all));
+  squares(kept_, Eigen::all) = (change / order).cwiseAbs2();
+  squares(next_, Eigen::all) = squares(kept_, Eigen::all).eval();
+  return squares;
 }
 
 }  // namespace llmt::discovery

@@ -6,6 +6,11 @@
 
 namespace llmt::discovery {
 
+/// A function that describes less of the variance of an output has other derivatives than the simulation.
+inline constexpr double well_described = 0.98;
+/// One that describes less of it knows neither jumps of the simulation nor what errors of the inputs do to it.
+inline constexpr double roughly_described = 0.9;
+
 /// Least squares of simulated outputs on a constant, x, x^2, x^3, x x', x^2 x' (up to 8 inputs), sin x and cos x of
 /// inputs that stay within half a turn or more of zero, and sgn x, |x|, x |x| of inputs that change sign. Where these
 /// describe less than 98 % of the variance, peaks sgn x exp(-(2^k x / s)^2) are tried, k = 0 to 6, s the spread of x:

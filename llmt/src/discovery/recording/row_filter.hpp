@@ -3,9 +3,10 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <vector>
 
-#include "discovery/terms/samples.hpp"
+#include "discovery/recording/samples.hpp"
 #include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
@@ -13,8 +14,9 @@ namespace llmt::discovery {
 /// Rows in time at even steps, in pieces without a gap.
 class RowFilter {
  public:
-  /// Inputs::cutoff is above 0. Throws std::invalid_argument for rows that are too far apart for it.
-  explicit RowFilter(const Inputs& inputs);
+  /// `rows`: their order and instants; `inputs`: where columns jump. The cutoff is above 0. Throws
+  /// std::invalid_argument for rows that are too far apart for it.
+  RowFilter(const Rows& rows, const Eigen::MatrixXd& inputs, double cutoff);
 
   /// Rows in the order of time, piece after piece.
   const std::vector<std::vector<Eigen::Index>>& pieces() const { return pieces_; }
@@ -36,12 +38,21 @@ class RowFilter {
   double step_ = 0.0;
 };
 
-/// Squares of the errors of as_measured() where what is computed changes between rows, n x d: a third of the change if
-/// every other row is left out (Richardson 1911), at rows left out that of their neighbour. 0 where rows are too far
-/// apart to leave some out.
-Eigen::MatrixXd squared_errors_of_steps(const Inputs& inputs, const Eigen::MatrixXd& of_rows);
+/// The errors of filtered columns where what is computed changes between rows: a third of the change if every other row
+/// is left out (Richardson 1911), at rows left out that of their neighbour. 0 where rows are too far apart to leave
+/// some out.
+class ErrorsOfSteps {
+ public:
+  /// `filter` and what it was made of.
+  ErrorsOfSteps(const RowFilter& filter, const Rows& rows, const Eigen::MatrixXd& inputs, double cutoff);
 
-/// What is computed at the rows, as the measured outputs are: filtered if these are.
-Eigen::MatrixXd as_measured(const Inputs& inputs, const Eigen::MatrixXd& of_rows);
+  /// n x d of columns of values at all rows, by the same filter.
+  Eigen::MatrixXd squares(const RowFilter& filter, const Eigen::MatrixXd& of_rows) const;
+
+ private:
+  std::vector<Eigen::Index> kept_;
+  std::vector<Eigen::Index> next_;  // the row left out after it, or itself
+  std::optional<RowFilter> of_kept_;
+};
 
 }  // namespace llmt::discovery

@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "discovery/terms/samples.hpp"
+#include "discovery/recording/recording.hpp"
+#include "discovery/recording/samples.hpp"
 #include "llmt/discovery/missing.hpp"
-#include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
 
@@ -24,21 +24,14 @@ RowSplit split_independent(const Inputs& inputs, const MissingOptions& options);
 /// For rows in time (Inputs::instants). Set aside are whole runs where there are at least four; else stretches of
 /// consecutive rows. A sample is the mean over a block of consecutive rows, as long as the inputs bear: the longest
 /// block within which every smooth input varies by at most 3 % of its variance, its noise not counted.
-RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options, Eigen::Index fewest_samples);
+RowSplit split_in_time(const Recording& recording, const MissingOptions& options, Eigen::Index fewest_samples);
 
 /// The longest block, of those that leave at least largest_sample of them, that the inputs bear, as in split_in_time();
 /// 1 where fewer than half of the inputs are smooth.
-Eigen::Index bearable_block(const Inputs& inputs, const MissingOptions& options);
+Eigen::Index bearable_block(const Recording& recording, const MissingOptions& options);
 
 /// Blocks of `length` consecutive rows or a little more, each within one stretch of a recording.
-Samples blocks_in_time(const Inputs& inputs, Eigen::Index length);
-
-/// Variance of the noise of equally spaced values of a smooth signal, from third differences: var(D^3 e) = 20 var(e).
-/// NaN for fewer than 4 values.
-double noise_variance(const Eigen::VectorXd& values);
-
-/// Whether the noise of an input is at most 40 % of its variance, for rows in time.
-bool is_smooth_in_time(const Inputs& inputs, Eigen::Index column);
+Samples blocks_in_time(const Recording& recording, Eigen::Index length);
 
 /// Whether rows follow each other as those of a log do.
 enum class AlongRows {
@@ -47,5 +40,8 @@ enum class AlongRows {
   measured_signal  ///< smooth, and with noise, or with more rows than a search takes: a log
 };
 AlongRows along_rows(const Inputs& inputs, const MissingOptions& options);
+
+/// The split without the rows set apart. A sample keeps those of its rows that are left, if half of them are.
+RowSplit without_rows(const RowSplit& split, const std::vector<bool>& apart);
 
 }  // namespace llmt::discovery

@@ -1,4 +1,4 @@
-#include "discovery/terms/surrogate.hpp"
+#include "discovery/recording/surrogate.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -28,9 +28,8 @@ Surrogate::Surrogate(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simul
       with_peaks_(inputs.cols(), false) {
   for (double& spread : spread_) spread = spread > 0.0 ? spread : 1.0;
   fit(inputs, simulated);
-  constexpr double well = 0.98;
   constexpr double clearly = 0.8;
-  for (Eigen::Index j = 0; j < inputs.cols() && described_.minCoeff() < well; ++j) {
+  for (Eigen::Index j = 0; j < inputs.cols() && described_.minCoeff() < well_described; ++j) {
     if (!changes_sign(j)) continue;
     const Surrogate without = *this;
     with_peaks_[j] = true;

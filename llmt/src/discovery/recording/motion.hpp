@@ -1,34 +1,21 @@
-// Inputs that are a position, its speed and its acceleration.
+// Speeds with less errors, from the positions and accelerations that belong to them.
 #pragma once
 
 #include <Eigen/Core>
 #include <string>
 #include <vector>
 
-#include "discovery/terms/derivatives.hpp"
-#include "llmt/discovery/model_term.hpp"
+#include "discovery/recording/apart.hpp"
+#include "discovery/recording/recording.hpp"
 
 namespace llmt::discovery {
 
-struct Motion {
-  Eigen::Index position = 0;  ///< columns of the inputs
-  Eigen::Index speed = 0;
-  Eigen::Index acceleration = 0;
-  double second = 1.0;  ///< in units of the instants
-};
-
-/// Found by comparing derivatives of the inputs with the other inputs.
-std::vector<Motion> motions(const Derivatives& derivatives, const Inputs& inputs);
-
-/// Whether an input is the first or second derivative by time of an output (n values).
-bool is_derivative_of(const Derivatives& derivatives, const Eigen::VectorXd& input, const Eigen::VectorXd& output);
-
 /// Inputs whose speeds have less errors, and what that changes.
 struct SmoothedInputs {
-  Inputs inputs;
+  Recording recording;
   Eigen::VectorXd errors;          ///< standard deviations in what was replaced, before; 0: the input was not smoothed
   Eigen::MatrixXd change;          ///< n x d of the simulated outputs; empty: nothing was smoothed
-  std::vector<bool> unknown_sign;  ///< rows at which a speed was not smoothed, and is within 3 standard deviations of 0
+  Apart unknown_sign;              ///< rows at which a speed was not smoothed, and is within 3 standard deviations of 0
   std::vector<std::string> notes;  ///< in sentences
 };
 
@@ -40,6 +27,6 @@ struct SmoothedInputs {
 /// around which the polynomial leaves more than the errors (chi^2), in narrower windows as well. The simulated outputs
 /// (n x d) follow by the function of the inputs that describes at least 98 % of their variance; where there is none,
 /// nothing is replaced.
-SmoothedInputs smoothed(const Inputs& inputs, const Eigen::MatrixXd& simulated);
+SmoothedInputs smoothed(const Recording& recording, const Eigen::MatrixXd& simulated);
 
 }  // namespace llmt::discovery
