@@ -5,9 +5,9 @@
 #include <string>
 #include <utility>
 
+#include "discovery/answer/findings.hpp"
+#include "discovery/answer/judges.hpp"
 #include "discovery/search/replacements.hpp"
-#include "discovery/terms/decision.hpp"
-#include "discovery/terms/missing_findings.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "search_cases.hpp"
 

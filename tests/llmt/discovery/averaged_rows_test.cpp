@@ -1,5 +1,5 @@
 // Logs with more rows than a search can use.
-#include "discovery/terms/averaged_rows.hpp"
+#include "discovery/answer/averaged_rows.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Answers among other terms: which of two stands, and when another is looked for.
-#include "discovery/terms/contests.hpp"
+#include "discovery/answer/contests.hpp"
 
 #include <gtest/gtest.h>
 

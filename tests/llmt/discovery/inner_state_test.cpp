@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "discovery/recording/derivatives.hpp"
-#include "discovery/terms/resonance.hpp"
+#include "discovery/terms/term_builders.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 

@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "discovery/answer/question.hpp"
 #include "discovery/recording/recording.hpp"
-#include "discovery/terms/term_question.hpp"
 #include "filtered_log.hpp"
 #include "llmt/discovery/search.hpp"
 

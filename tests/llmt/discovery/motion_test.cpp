@@ -6,8 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "discovery/recording/motion.hpp"
-#include "discovery/recording/standstill.hpp"
+#include "discovery/recording/speeds.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "noise.hpp"

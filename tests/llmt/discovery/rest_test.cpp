@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "discovery/recording/standstill.hpp"
+#include "discovery/recording/speeds.hpp"
 #include "discovery/recording/surrogate.hpp"
 #include "llmt/random.hpp"
 

@@ -1,5 +1,5 @@
 // How much each sample counts.
-#include "discovery/terms/sample_weights.hpp"
+#include "discovery/answer/errors_of_inputs.hpp"
 
 #include <gtest/gtest.h>
 

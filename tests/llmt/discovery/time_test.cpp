@@ -6,10 +6,10 @@
 #include <numbers>
 #include <set>
 
+#include "discovery/answer/judges.hpp"
 #include "discovery/recording/noise.hpp"
 #include "discovery/recording/row_split.hpp"
 #include "discovery/recording/samples.hpp"
-#include "discovery/terms/held_out.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 

@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "discovery/recording/standstill.hpp"
+#include "discovery/recording/speeds.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -122,7 +122,7 @@ std::vector<Apart> of_unknown_sign(const RowsSeen& seen) {
   std::vector<bool> apart(inputs.values.rows(), false);
   for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
     const Eigen::VectorXd x = inputs.values.col(j);
-    const double limit = sign_is_known * std::sqrt(covariance(j, j));
+    const double limit = hides_the_sign * std::sqrt(covariance(j, j));
     if (!(limit > 0.0) || x.minCoeff() >= 0.0 || x.maxCoeff() <= 0.0) continue;
     const std::vector<Eigen::Index> slow = rows_below(x, limit);
     double roughest = 0.0;  // mean square, in units of that of the other rows

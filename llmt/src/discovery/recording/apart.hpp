@@ -23,9 +23,6 @@ struct Apart {
   std::string sentence;
 };
 
-/// Within so many standard deviations of its errors the sign of an input is not known.
-inline constexpr double sign_is_known = 3.0;
-
 /// What rows are judged by.
 struct RowsSeen {
   const Recording& recording;

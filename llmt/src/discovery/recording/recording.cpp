@@ -9,18 +9,15 @@
 #include <utility>
 
 #include "discovery/recording/refuse.hpp"
-#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 namespace {
 
-Pieces pieces_of(const Inputs& inputs) {
+// `order`: of the rows in time.
+Pieces pieces_of(const Inputs& inputs, const Piece& order) {
   const Eigen::Index n = inputs.values.rows();
   const Eigen::VectorXd& instants = inputs.instants;
   const auto run = [&](Eigen::Index i) { return inputs.runs.empty() ? Eigen::Index{0} : inputs.runs[i]; };
-  Piece order(n);
-  std::iota(order.begin(), order.end(), Eigen::Index{0});
-  std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return std::pair(run(i), instants(i)); });
   std::vector<double> steps;
   for (Eigen::Index k = 1; k < n; ++k) {
     if (run(order[k]) != run(order[k - 1])) continue;
@@ -94,11 +91,14 @@ void check_inputs(const Inputs& inputs) {
   if (!inputs.instants.allFinite()) refuse("standard_terms", "an instant is not finite");
 }
 
-Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
+namespace {
+
+// Throws as check_inputs(), and where the order holds a value twice.
+Rows rows_in_order(const Inputs& inputs) {
   check_inputs(inputs);
   const Eigen::Index n = inputs.values.rows();
   Rows rows{.inputs = at_rest_as_zero(inputs),
-            .simulated = simulated,
+            .simulated = Eigen::VectorXd::Zero(n),
             .sequence = {},
             .instants = Eigen::VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1))};
   rows.sequence.resize(n);
@@ -129,8 +129,9 @@ Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
   return rows;
 }
 
-Recording::Recording(Inputs inputs)
-    : inputs_(std::move(inputs)), rows_(rows_of(inputs_, Eigen::VectorXd::Zero(inputs_.values.rows()))) {}
+}  // namespace
+
+Recording::Recording(Inputs inputs) : inputs_(std::move(inputs)), rows_(rows_in_order(inputs_)) {}
 
 Recording Recording::with_zero_bands(Eigen::VectorXd bands) const {
   Recording other = *this;
@@ -150,7 +151,7 @@ Recording Recording::with_values(Eigen::MatrixXd values) const {
 }
 
 const Pieces& Recording::pieces() const {
-  return once(known_.pieces, [&] { return pieces_of(inputs_); });
+  return once(known_.pieces, [&] { return pieces_of(inputs_, rows_.sequence); });
 }
 
 const std::vector<Signal>& Recording::signals() const {

@@ -7,7 +7,7 @@
 
 #include "discovery/recording/derivatives.hpp"
 #include "discovery/recording/noise.hpp"
-#include "discovery/recording/row_filter.hpp"
+#include "discovery/recording/samples.hpp"
 #include "discovery/recording/surrogate.hpp"
 #include "llmt/discovery/model_term.hpp"
 
@@ -29,7 +29,7 @@ struct Pieces {
 /// What takes time to find out is found out when it is asked for first, and kept.
 class Recording {
  public:
-  /// Throws as check_inputs().
+  /// Throws as rows_of().
   explicit Recording(Inputs inputs);
 
   /// The same rows, where terms take inputs within these bands for 0.

@@ -10,8 +10,7 @@
 #include <stdexcept>
 
 #include "discovery/recording/recording.hpp"
-#include "discovery/terms/memory_terms.hpp"
-#include "discovery/terms/resonance.hpp"
+#include "discovery/terms/term_builders.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "llmt/random.hpp"
 
@@ -136,9 +135,6 @@ ModelTerm delay(const std::shared_ptr<OfRows>& of_rows, const std::shared_ptr<co
 }
 
 ModelTerm resonance(const std::string& output, std::vector<double> frequencies) {
-  const auto constant = [](std::string name, std::string unit, std::vector<double> tried) {
-    return TermConstant{.name = std::move(name), .unit = std::move(unit), .tried = std::move(tried)};
-  };
   return {.family = "resonance",
           .location = "",
           .formula =
@@ -147,13 +143,9 @@ ModelTerm resonance(const std::string& output, std::vector<double> frequencies) 
           .inputs = {},
           .coefficients = {"share"},
           .columns = [](const Rows& rows, const Eigen::VectorXd& constants) -> Eigen::MatrixXd {
-            constexpr double least = 1e-3;
-            constexpr double most = 0.2;  // more is a filter: it hardly rings
-            return -resonant_part(rows, rows.simulated, std::max(constants(0), 1e-300),
-                                  std::clamp(constants(1), least, most));
+            return ringing(rows, rows.simulated, constants);
           },
-          .constants = {constant("frequency", "per unit of time", std::move(frequencies)),
-                        constant("damping ratio", "1", {0.02, 0.04, 0.08, 0.16})},
+          .constants = constants_of_ringing(std::move(frequencies)),
           .output = output,
           .inner_state = "a resonance, as of a load behind a spring",
           .shown_by = "an encoder or an accelerometer at the load",

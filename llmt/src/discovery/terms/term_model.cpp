@@ -4,11 +4,62 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "discovery/recording/refuse.hpp"
+#include "discovery/recording/row_split.hpp"
 #include "llmt/discovery/least_squares.hpp"
 
 namespace llmt::discovery {
+
+ColumnCache::ColumnCache(const Recording& recording) : places_(recording.inputs().values.rows(), -1) {
+  MissingOptions nothing_aside;
+  nothing_aside.held_out_share = 0.0;
+  all_ = split_in_time(recording, nothing_aside, 1).searched;
+  for (Eigen::Index i = 0; i < all_.size(); ++i) places_[all_.rows()[i]] = i;
+}
+
+namespace {
+
+bool is_of_inputs_alone(const ModelTerm& term) {
+  return !term.inputs.empty() && !term.code.empty() && term.inner_state.empty() &&
+         std::ranges::none_of(term.code, [](const std::string& code) { return code.find("$s") != std::string::npos; });
+}
+
+}  // namespace
+
+bool ColumnCache::holds(const ModelTerm& term) { return term.constants.empty() && is_of_inputs_alone(term); }
+
+bool ColumnCache::is_state_of_inputs(const ModelTerm& term) {
+  return !term.constants.empty() && !term.inner_state.empty() && !term.inputs.empty();
+}
+
+bool ColumnCache::holds_grid(const ModelTerm& term) {
+  return (!term.constants.empty() && is_of_inputs_alone(term)) || is_state_of_inputs(term);
+}
+
+Eigen::MatrixXd ColumnCache::of_samples(const Eigen::MatrixXd& all, const Samples& samples) const {
+  std::vector<Eigen::Index> places(samples.size());
+  for (Eigen::Index i = 0; i < samples.size(); ++i) places[i] = places_[samples.rows_of(i).front()];
+  return all(places, Eigen::all);
+}
+
+Eigen::MatrixXd ColumnCache::at(const Samples& samples, std::size_t draw, std::size_t term,
+                                const std::function<Eigen::MatrixXd()>& columns) {
+  const auto [place, is_new] = columns_.try_emplace({draw, term});
+  if (is_new) place->second = means(columns(), all_);
+  return of_samples(place->second, samples);
+}
+
+Eigen::MatrixXd ColumnCache::grid_at(const Samples& samples, std::size_t term,
+                                     const std::vector<Eigen::VectorXd>& tried,
+                                     const std::function<Eigen::MatrixXd(const Samples&)>& columns) {
+  std::vector<double> values;
+  for (const Eigen::VectorXd& constants : tried) values.insert(values.end(), constants.begin(), constants.end());
+  const auto [place, is_new] = grids_.try_emplace({term, std::move(values)});
+  if (is_new) place->second = columns(all_);
+  return of_samples(place->second, samples);
+}
 
 Eigen::Index first_bad_row(const Eigen::MatrixXd& values) {
   Eigen::Index row = 0;
@@ -107,50 +158,6 @@ std::string TermModel::label(const PlacedTerm& placed) const {
   return text;
 }
 
-Eigen::VectorXd weights_of(const TermData& data, Eigen::Index output) {
-  if (!data.weights) return Eigen::VectorXd::Ones(data.samples.size());
-  return means_of_filtered(data.weights->col(output), data.samples);
-}
-
-Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
-                                 const std::vector<PlacedTerm>& placed) {
-  const Eigen::MatrixXd& simulated = model.simulated(parameters);
-  Eigen::MatrixXd predicted = means(simulated, data.samples);
-  for (const PlacedTerm& term : placed) {
-    predicted.col(term.output) += model.means_of(term, simulated, data.samples) * term.coefficients;
-  }
-  const Eigen::Index d = data.measured.cols();
-  Eigen::VectorXd residuals(data.measured.size());
-  for (Eigen::Index o = 0; o < d; ++o) {
-    residuals(Eigen::seqN(o, data.measured.rows(), d)) =
-        (data.measured.col(o) - predicted.col(o)).cwiseProduct(weights_of(data, o)) / data.sigma(o);
-  }
-  return residuals;
-}
-
-Eigen::MatrixXd baseline_jacobian(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
-                                  const std::vector<PlacedTerm>& placed) {
-  LeastSquaresProblem problem;
-  problem.parameters = model.parameters();
-  problem.residual = [&](const Eigen::VectorXd& values) { return scaled_residuals(model, data, values, placed); };
-  std::vector<Eigen::Index> free;
-  for (std::size_t k = 0; k < problem.parameters.size(); ++k) {
-    if (problem.parameters[k].free) free.push_back(k);
-  }
-  if (free.empty()) return Eigen::MatrixXd(data.measured.size(), 0);
-  return -difference_jacobian(problem, parameters)(Eigen::all, free);
-}
-
-Eigen::MatrixXd stacked_signature(const TermModel& model, const TermData& data, const PlacedTerm& placed,
-                                  const Eigen::MatrixXd& simulated) {
-  const Eigen::MatrixXd of_samples = model.means_of(placed, simulated, data.samples);
-  const Eigen::Index d = data.measured.cols();
-  Eigen::MatrixXd signature = Eigen::MatrixXd::Zero(data.measured.size(), of_samples.cols());
-  const Eigen::VectorXd scale = weights_of(data, placed.output) / data.sigma(placed.output);
-  signature(Eigen::seqN(placed.output, data.measured.rows(), d), Eigen::all) = scale.asDiagonal() * of_samples;
-  return signature;
-}
-
 Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& missing,
                                  const std::vector<ModelTerm>& terms, const Recording& elsewhere) {
   const bool has_bands = elsewhere.inputs().zero_bands.size() > 0;
@@ -172,6 +179,23 @@ std::vector<PlacedTerm> placed_terms(const Missing& missing) {
     placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
   }
   return placed;
+}
+
+Eigen::VectorXd within_range(const ModelTerm& term, Eigen::VectorXd constants) {
+  for (Eigen::Index k = 0; k < constants.size(); ++k) {
+    const std::vector<double>& tried = term.constants[static_cast<std::size_t>(k)].tried;
+    double low = tried.front() - spacing(tried, tried.front());
+    if (tried.front() > 0.0) low = std::max(low, 0.5 * tried.front());
+    constants(k) = std::clamp(constants(k), low, tried.back() + spacing(tried, tried.back()));
+  }
+  return constants;
+}
+
+double spacing(const std::vector<double>& tried, double value) {
+  if (tried.size() < 2) return std::max(1e-300, 0.01 * std::abs(value));
+  const auto above = std::ranges::lower_bound(tried, value);
+  const auto k = std::clamp<Eigen::Index>(above - tried.begin(), 1, std::ssize(tried) - 1);
+  return std::max(1e-300, tried[k] - tried[k - 1]);
 }
 
 }  // namespace llmt::discovery

@@ -260,4 +260,10 @@ std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string&
   return sequence_terms(view(inputs, place - inputs.names.begin()), inputs.order);
 }
 
+Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
+  Rows rows = Recording(inputs).rows();
+  rows.simulated = simulated;
+  return rows;
+}
+
 }  // namespace llmt::discovery
