@@ -7,7 +7,6 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
-#include <set>
 
 #include "discovery/terms/term_model.hpp"
 

@@ -10,14 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "discovery/recording/noise.hpp"
 #include "discovery/recording/refuse.hpp"
 #include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
 namespace {
 
-// Files have a limited number of digits; noise is larger.
-constexpr double digits = 1e-6;
 // Rows beyond the unknowns, of which none fits by chance.
 constexpr Eigen::Index fewest_rows_judged = 10;
 
@@ -41,7 +40,7 @@ Affine affine(const Eigen::MatrixXd& inputs, const Chosen& chosen, const Eigen::
   Affine result;
   result.coefficients = columns.colPivHouseholderQr().solve(output);
   const double range = output.maxCoeff() - output.minCoeff();
-  result.is_exact = (output - columns * result.coefficients).cwiseAbs().maxCoeff() <= digits * range;
+  result.is_exact = (output - columns * result.coefficients).cwiseAbs().maxCoeff() <= digits_of_a_file * range;
   for (Eigen::Index j = 1; j <= k; ++j) {
     if (scales(j) > 0.0) result.coefficients(j) /= scales(j);
   }
@@ -57,7 +56,7 @@ std::string formula(const Affine& found, const Inputs& inputs, const Chosen& cho
     if (name.empty()) {
       text += fmt::format("{:.4g}", size);
     } else {
-      text += std::abs(size - 1.0) < digits ? name : fmt::format("{:.4g} {}", size, name);
+      text += std::abs(size - 1.0) < digits_of_a_file ? name : fmt::format("{:.4g} {}", size, name);
     }
   };
   double largest = 0.0;
@@ -66,7 +65,7 @@ std::string formula(const Affine& found, const Inputs& inputs, const Chosen& cho
     add(coefficient, inputs.names[chosen[j]]);
     largest = std::max(largest, std::abs(coefficient) * inputs.values.col(chosen[j]).cwiseAbs().maxCoeff());
   }
-  if (std::abs(found.coefficients(0)) > digits * largest) add(found.coefficients(0), "");
+  if (std::abs(found.coefficients(0)) > digits_of_a_file * largest) add(found.coefficients(0), "");
   return text;
 }
 

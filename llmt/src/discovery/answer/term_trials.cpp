@@ -132,7 +132,7 @@ class Trials {
     if (p == 0 || term.inputs.empty()) return Eigen::VectorXd::Ones(n);
     const Eigen::VectorXd x = means(model_->input(term.inputs.front()), data_->samples);
     const double middle = 0.5 * (x.minCoeff() + x.maxCoeff());
-    const double half = std::max(1e-300, 0.5 * (x.maxCoeff() - x.minCoeff()));
+    const double half = std::max(smallest_divisor, 0.5 * (x.maxCoeff() - x.minCoeff()));
     return ((x.array() - middle) / half).pow(static_cast<double>(p)).matrix();
   }
 };

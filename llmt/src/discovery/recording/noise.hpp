@@ -14,6 +14,9 @@ using Piece = std::vector<Eigen::Index>;
 /// A signal whose noise is a larger share of its variance is not smooth: its neighbours say nothing of it.
 inline constexpr double largest_noise_of_smooth = 0.4;
 
+/// Files have a limited number of digits: what differs by less than this share of its range is the same.
+inline constexpr double digits_of_a_file = 1e-6;
+
 /// The variance of a column and of its noise.
 struct Signal {
   Eigen::Index column = 0;

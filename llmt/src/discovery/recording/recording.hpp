@@ -26,7 +26,7 @@ struct Pieces {
   double step = 0.0;               ///< median time between rows
 };
 
-/// What takes time to find out is found out when it is asked for first, and kept.
+/// What takes time to find out is found out when it is asked for first, and kept. For one thread at a time.
 class Recording {
  public:
   /// Throws as rows_of().

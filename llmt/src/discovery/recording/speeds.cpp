@@ -159,9 +159,8 @@ SmoothedInputs smoothed(const Recording& recording, const Eigen::MatrixXd& simul
     for (Eigen::Index k = 0; k < 3; ++k) {
       own.col(k) = inputs.values.col(columns[k]);
       // A signal without errors is as good as its digits.
-      constexpr double digits = 1e-6;
       const double spread = std::sqrt((own.col(k).array() - own.col(k).mean()).square().mean());
-      errors(k) = std::max(std::sqrt(covariance(columns[k], columns[k])), digits * spread);
+      errors(k) = std::max(std::sqrt(covariance(columns[k], columns[k])), digits_of_a_file * spread);
     }
     const Speed better = smooth_speed(recording.rows(), own, errors, motion.second, recording.lag());
     constexpr double a_third = 1.0 / 3.0;

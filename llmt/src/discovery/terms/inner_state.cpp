@@ -11,6 +11,7 @@
 
 #include "discovery/recording/recording.hpp"
 #include "discovery/terms/term_builders.hpp"
+#include "discovery/terms/term_model.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "llmt/random.hpp"
 
@@ -236,7 +237,7 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
       for (std::size_t k = 0; k < term.constants.size(); ++k) constants(k) = term.constants[k].tried.front();
       const Eigen::MatrixXd columns = term.columns(here, constants);
       term.lower = Eigen::VectorXd::Zero(columns.cols());
-      term.upper = (far * output.norm() / columns.colwise().norm().array().max(1e-300)).matrix().transpose();
+      term.upper = (far * output.norm() / columns.colwise().norm().array().max(smallest_divisor)).matrix().transpose();
     };
     const auto place = static_cast<Eigen::Index>(o);
     terms.push_back(delay(of_rows, surrogate, rows, inputs.cutoff > 0.0, outputs[o], place));

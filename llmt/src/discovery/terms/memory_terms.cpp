@@ -10,6 +10,7 @@
 #include "discovery/recording/derivatives.hpp"
 #include "discovery/recording/noise.hpp"
 #include "discovery/terms/term_builders.hpp"
+#include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -109,7 +110,7 @@ std::vector<TermConstant> constants_of_ringing(std::vector<double> frequencies) 
 Eigen::VectorXd ringing(const Rows& rows, const Eigen::VectorXd& signal, const Eigen::VectorXd& constants) {
   constexpr double least = 1e-3;
   constexpr double most = 0.2;
-  return -resonant_part(rows, signal, std::max(constants(0), 1e-300), std::clamp(constants(1), least, most));
+  return -resonant_part(rows, signal, std::max(constants(0), smallest_divisor), std::clamp(constants(1), least, most));
 }
 
 namespace {
@@ -183,8 +184,7 @@ ModelTerm slow_state(std::string family, const std::string& input, std::string f
   term.coefficients = {"coefficient"};
   term.per = std::move(per);
   term.columns = [column = std::move(column), place](const Rows& rows, const Eigen::VectorXd& constants) {
-    constexpr double least = 1e-300;
-    return Eigen::MatrixXd(column(rows, rows.inputs.col(place), std::max(least, constants(0))));
+    return Eigen::MatrixXd(column(rows, rows.inputs.col(place), std::max(smallest_divisor, constants(0))));
   };
   term.constants = {{.name = "time constant", .unit = "units of time", .tried = times}};
   term.output = output;

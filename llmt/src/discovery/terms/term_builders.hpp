@@ -11,6 +11,11 @@
 
 namespace llmt::discovery {
 
+/// Fewer values of an input do not tell a constant that is searched.
+inline constexpr std::size_t fewest_values_of_a_search = 8;
+/// With more inputs the choice among pairs of them that are no products would cost every term evidence.
+inline constexpr std::size_t most_inputs_of_pairs = 8;
+
 /// One input as terms see it.
 struct InputView {
   Eigen::Index column = 0;

@@ -192,10 +192,10 @@ Eigen::VectorXd within_range(const ModelTerm& term, Eigen::VectorXd constants) {
 }
 
 double spacing(const std::vector<double>& tried, double value) {
-  if (tried.size() < 2) return std::max(1e-300, 0.01 * std::abs(value));
+  if (tried.size() < 2) return std::max(smallest_divisor, 0.01 * std::abs(value));
   const auto above = std::ranges::lower_bound(tried, value);
   const auto k = std::clamp<Eigen::Index>(above - tried.begin(), 1, std::ssize(tried) - 1);
-  return std::max(1e-300, tried[k] - tried[k - 1]);
+  return std::max(smallest_divisor, tried[k] - tried[k - 1]);
 }
 
 }  // namespace llmt::discovery

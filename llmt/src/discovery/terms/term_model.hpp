@@ -17,6 +17,9 @@
 
 namespace llmt::discovery {
 
+/// Where a value may be 0, as a constant on the way of a fit, this is divided by.
+inline constexpr double smallest_divisor = 1e-300;
+
 /// A term on one output with its constants and coefficients.
 struct PlacedTerm {
   std::size_t term = 0;

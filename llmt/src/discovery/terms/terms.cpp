@@ -81,13 +81,11 @@ ModelTerm product(const InputView& a, const InputView& b) { return power_product
 ModelTerm square_product(const InputView& a, const InputView& b) { return power_product("square_product", a, 2, b); }
 
 std::vector<ModelTerm> products_of(const std::vector<InputView>& inputs) {
-  // With more inputs the choice among their squares times others would cost every term evidence.
-  constexpr std::size_t most = 8;
   std::vector<ModelTerm> terms;
   for (std::size_t a = 0; a < inputs.size(); ++a) {
     for (std::size_t b = a + 1; b < inputs.size(); ++b) terms.push_back(product(inputs[a], inputs[b]));
   }
-  if (inputs.size() > most) return terms;
+  if (inputs.size() > most_inputs_of_pairs) return terms;
   for (const InputView& a : inputs) {
     for (const InputView& b : inputs) {
       if (a.column != b.column && a.distinct.size() > 2) terms.push_back(square_product(a, b));
