@@ -5,9 +5,9 @@
 #include <string>
 #include <utility>
 
+#include "discovery/answer/findings.hpp"
+#include "discovery/answer/judges.hpp"
 #include "discovery/search/replacements.hpp"
-#include "discovery/terms/decision.hpp"
-#include "discovery/terms/missing_findings.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "search_cases.hpp"
 
@@ -72,12 +72,14 @@ TEST(Answers, AWidthIsNotBelowTheErrorsOfItsInput) {
   inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, 1.0);
   inputs.noise = Eigen::VectorXd::Constant(1, 0.01);
   const std::vector<ModelTerm> terms = standard_terms(inputs);
+  const Recording recording(inputs);
   const auto stribeck =
       static_cast<std::size_t>(std::ranges::find(terms, "stribeck", &ModelTerm::family) - terms.begin());
   const auto is_too_narrow = [&](double width, double of_smoothed) {
     Missing missing = answer_with({found_term(stribeck, "stribeck", "v", 1.0, 0.01)});
     missing.found[0].constants = Eigen::VectorXd::Constant(1, width);
-    return narrower_than_errors(missing, terms, inputs, Eigen::VectorXd::Constant(1, of_smoothed)).contains(stribeck);
+    return narrower_than_errors(missing, terms, recording, Eigen::VectorXd::Constant(1, of_smoothed))
+        .contains(stribeck);
   };
   EXPECT_TRUE(is_too_narrow(0.039, 0.0));
   EXPECT_FALSE(is_too_narrow(0.041, 0.0));

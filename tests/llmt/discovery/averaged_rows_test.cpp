@@ -1,5 +1,5 @@
 // Logs with more rows than a search can use.
-#include "discovery/terms/averaged_rows.hpp"
+#include "discovery/answer/averaged_rows.hpp"
 
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ struct Log {
 
 TEST(AveragedRows, AreMeansWithinARun) {
   const Log log;
-  const std::optional<AveragedRows> few = averaged(log.inputs, log.measured, {.largest_sample = 50}, most);
+  const std::optional<AveragedRows> few = averaged(Recording(log.inputs), log.measured, {.largest_sample = 50}, most);
   ASSERT_TRUE(few);
   EXPECT_EQ(few->blocks.size(), 1250 + 1749);  // of four rows or five
   EXPECT_EQ(std::ssize(few->blocks.rows()), rows);
@@ -48,27 +48,27 @@ TEST(AveragedRows, AreMeansWithinARun) {
     const auto own = few->blocks.rows_of(b);
     double mean = 0.0;
     for (const Eigen::Index row : own) {
-      EXPECT_EQ(log.inputs.runs[row], few->inputs.runs[b]);
+      EXPECT_EQ(log.inputs.runs[row], few->recording.inputs().runs[b]);
       mean += log.measured.values(row, 0) / static_cast<double>(own.size());
     }
     EXPECT_NEAR(few->measured.values(b, 0), mean, 1e-12);
-    EXPECT_NEAR(few->inputs.instants(b), 0.5 * (log.inputs.instants(own.front()) + log.inputs.instants(own.back())),
-                1e-9);
+    EXPECT_NEAR(few->recording.inputs().instants(b),
+                0.5 * (log.inputs.instants(own.front()) + log.inputs.instants(own.back())), 1e-9);
   }
 }
 
 TEST(AveragedRows, AreNotMadeWhereInputsChangeFastOrRowsAreFew) {
   Log log;
   const auto is_averaged = [&](Eigen::Index fewest) {
-    return averaged(log.inputs, log.measured, {.largest_sample = 50}, fewest).has_value();
+    return averaged(Recording(log.inputs), log.measured, {.largest_sample = 50}, fewest).has_value();
   };
   EXPECT_TRUE(is_averaged(most));
   EXPECT_FALSE(is_averaged(rows / 2 + 1));
   log.inputs.noise = Eigen::VectorXd::Constant(1, 0.01);
-  const std::optional<AveragedRows> few = averaged(log.inputs, log.measured, {.largest_sample = 50}, most);
+  const std::optional<AveragedRows> few = averaged(Recording(log.inputs), log.measured, {.largest_sample = 50}, most);
   ASSERT_TRUE(few);
   const double length = static_cast<double>(rows) / static_cast<double>(few->blocks.size());
-  EXPECT_NEAR(few->inputs.noise(0), 0.01 / std::sqrt(std::floor(length)), 1e-12);  // that of a mean
+  EXPECT_NEAR(few->recording.inputs().noise(0), 0.01 / std::sqrt(std::floor(length)), 1e-12);  // that of a mean
   log.inputs.noise = {};
   const Eigen::ArrayXd fast = (2.0 * 3.14159 * 40.0 * log.inputs.instants).array().sin();
   log.inputs.values.col(0) = fast.matrix();
@@ -80,14 +80,15 @@ TEST(AveragedRows, AreNotMadeWhereInputsChangeFastOrRowsAreFew) {
 TEST(AveragedRows, WhatWasFoundIsToldOfAllRows) {
   const Log log;
   const std::vector<ModelTerm> terms = standard_terms(log.inputs);
-  const std::optional<AveragedRows> few = averaged(log.inputs, log.measured, {.largest_sample = 50}, most);
+  const std::optional<AveragedRows> few = averaged(Recording(log.inputs), log.measured, {.largest_sample = 50}, most);
   ASSERT_TRUE(few);
   const Simulation of_means = averaged(log.simulation, log.inputs, few->blocks);
-  const Missing of_blocks = find_missing(of_means, few->inputs, few->measured, terms, {.largest_sample = 1000});
+  const Missing of_blocks =
+      find_missing(of_means, few->recording.inputs(), few->measured, terms, {.largest_sample = 1000});
   ASSERT_EQ(of_blocks.found.size(), 1u);
   EXPECT_EQ(of_blocks.found[0].family, "square");
   EXPECT_NEAR(of_blocks.found[0].coefficients(0), 1.0, 0.01);
-  const Missing missing = of_all_rows(of_blocks, *few, log.simulation, terms, log.inputs);
+  const Missing missing = of_all_rows(of_blocks, *few, log.simulation, terms, Recording(log.inputs));
   EXPECT_EQ(missing.held_out.size(), missing.held_out_samples.size());
   EXPECT_EQ(missing.searched.size() + missing.held_out.size(), static_cast<std::size_t>(rows));
   std::vector<Eigen::Index> all = missing.searched;

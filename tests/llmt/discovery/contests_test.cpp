@@ -1,5 +1,5 @@
 // Answers among other terms: which of two stands, and when another is looked for.
-#include "discovery/terms/contests.hpp"
+#include "discovery/answer/contests.hpp"
 
 #include <gtest/gtest.h>
 
@@ -71,7 +71,8 @@ struct Log {
 
 TEST(CrossValidation, PredictsEveryStretchByAFitOfTheOthers) {
   const Log log;
-  const CrossValidation validation(log.simulation, log.inputs, log.measured, log.terms, {.fewest_samples = rows}, {});
+  const Recording recording(log.inputs);
+  const CrossValidation validation(log.simulation, recording, log.measured, log.terms, {.fewest_samples = rows}, {});
   const Eigen::MatrixXd errors = validation.errors(log.answer({"square", "linear"}), {});
   ASSERT_EQ(errors.rows(), rows);
   Eigen::MatrixXd columns(rows, 2);
@@ -153,7 +154,8 @@ TEST(Contests, FewerNumbersHaveTheNameWhereRowsCannotTell) {
 
 // The families that the searches of contests leave out, of some that are looked for.
 std::vector<std::string> left_out_for(const Log& log, const Missing& found, const std::set<std::size_t>& refuted = {}) {
-  const CrossValidation validation(log.simulation, log.inputs, log.measured, log.terms, {.fewest_samples = rows}, {});
+  const Recording recording(log.inputs);
+  const CrossValidation validation(log.simulation, recording, log.measured, log.terms, {.fewest_samples = rows}, {});
   std::vector<std::string> all;
   contested(
       found, log.terms, refuted, validation, [&](const std::vector<ModelTerm>&, const std::set<std::size_t>& left_out) {

@@ -1,5 +1,5 @@
 // Which answer follows from which objections: the table of docs/algorithms/rows-in-time.md.
-#include "discovery/terms/decision.hpp"
+#include "discovery/answer/judges.hpp"
 
 #include <gtest/gtest.h>
 

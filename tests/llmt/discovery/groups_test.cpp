@@ -1,5 +1,5 @@
 // Terms that explain as much in the place of one that was found.
-#include "discovery/terms/groups.hpp"
+#include "discovery/answer/one_search.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <span>
 #include <string>
 
-#include "discovery/terms/term_question.hpp"
+#include "discovery/answer/question.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 
@@ -39,7 +39,8 @@ struct Table {
   }
 
   Missing grouped() const {
-    const TermModel model(simulation, inputs, {"y"}, terms);
+    const Recording recording(inputs);
+    const TermModel model(simulation, recording, {"y"}, terms);
     Samples samples;
     for (Eigen::Index i = 0; i < n; ++i) samples.add(std::span(&i, 1));
     const TermData data{.samples = samples,

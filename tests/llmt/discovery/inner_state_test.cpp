@@ -6,8 +6,8 @@
 #include <numbers>
 #include <vector>
 
-#include "discovery/terms/derivatives.hpp"
-#include "discovery/terms/resonance.hpp"
+#include "discovery/recording/derivatives.hpp"
+#include "discovery/terms/term_builders.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 

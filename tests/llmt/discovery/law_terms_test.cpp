@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "discovery/terms/missing_findings.hpp"
+#include "discovery/answer/findings.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/random.hpp"
 

@@ -1,5 +1,5 @@
 // Sensors and actuators at their limit.
-#include "discovery/terms/limits.hpp"
+#include "discovery/recording/apart.hpp"
 
 #include <gtest/gtest.h>
 
@@ -26,33 +26,32 @@ Eigen::VectorXd noise(std::uint64_t seed, double scale) {
   return Eigen::VectorXd::NullaryExpr(n, [&] { return scale * random.normal(); });
 }
 
-std::vector<AtLimit> limits_of(const Eigen::VectorXd& measured, const Eigen::VectorXd& simulated,
-                               std::vector<bool>& apart) {
-  apart.assign(n, false);
-  return rows_at_limits({{"p"}, measured}, simulated, apart);
+std::vector<Apart> limits_of(const Eigen::VectorXd& measured, const Eigen::VectorXd& simulated) {
+  const Recording recording({{"x"}, simulated});
+  return rows_apart(ApartWhen::before_searches, {recording, {{"p"}, measured}, simulated});
 }
 
 TEST(Limits, OfASensorAreFoundOnBothSides) {
   const Eigen::VectorXd truth = sine(10.0) + noise(1, 0.1);
-  std::vector<bool> apart;
-  const std::vector<AtLimit> found = limits_of(truth.cwiseMin(8.0).cwiseMax(-9.5), sine(10.0), apart);
+  const std::vector<Apart> found = limits_of(truth.cwiseMin(8.0).cwiseMax(-9.5), sine(10.0));
   ASSERT_EQ(found.size(), 2U);
-  EXPECT_EQ(found[0].limit, 8.0);
-  EXPECT_EQ(found[1].limit, -9.5);
-  EXPECT_EQ(found[0].rows, (truth.array() >= 8.0).count());
+  EXPECT_EQ(found[0].reason, ApartReason::at_limit);
+  EXPECT_TRUE(found[0].sentence.starts_with("p is exactly 8, its largest value,")) << found[0].sentence;
+  EXPECT_TRUE(found[1].sentence.starts_with("p is exactly -9.5, its smallest value,")) << found[1].sentence;
+  EXPECT_EQ(std::ssize(found[0].rows), (truth.array() >= 8.0).count());
+  std::vector<bool> apart(n, false);
+  mark(found, apart);
   EXPECT_EQ(std::ranges::count(apart, true), (truth.array() >= 8.0 || truth.array() <= -9.5).count());
 }
 
 TEST(Limits, AreNoEndsOfAResolutionNoRestAndNoLevels) {
-  std::vector<bool> apart;
   const Eigen::VectorXd rounded = (sine(10.0) * 4.0).array().round().matrix() / 4.0;
-  EXPECT_TRUE(limits_of(rounded, sine(10.3), apart).empty());
-  EXPECT_TRUE(limits_of(sine(10.0).cwiseMax(0.0), sine(10.0), apart).empty());  // a valve that is closed
+  EXPECT_TRUE(limits_of(rounded, sine(10.3)).empty());
+  EXPECT_TRUE(limits_of(sine(10.0).cwiseMax(0.0), sine(10.0)).empty());  // a valve that is closed
   const Eigen::VectorXd levels = (sine(3.0)).array().round().matrix();
-  EXPECT_TRUE(limits_of(levels.cwiseMin(2.0), sine(3.0), apart).empty());
+  EXPECT_TRUE(limits_of(levels.cwiseMin(2.0), sine(3.0)).empty());
   // The simulation has stopped there as well.
-  EXPECT_TRUE(limits_of(sine(10.0).cwiseMin(8.0), sine(10.0).cwiseMin(8.0), apart).empty());
-  EXPECT_EQ(std::ranges::count(apart, true), 0);
+  EXPECT_TRUE(limits_of(sine(10.0).cwiseMin(8.0), sine(10.0).cwiseMin(8.0)).empty());
 }
 
 // A complete model and a sensor that stops at 8: nothing is missing at the other rows, and the answer says so.

@@ -8,9 +8,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "discovery/terms/input_noise.hpp"
-#include "discovery/terms/row_filter.hpp"
-#include "discovery/terms/term_question.hpp"
+#include "discovery/answer/question.hpp"
+#include "discovery/recording/recording.hpp"
 #include "filtered_log.hpp"
 #include "llmt/discovery/search.hpp"
 
@@ -23,7 +22,8 @@ TEST(FilteredRows, AreWeightedSumsThatEndWhereTheRecordingDoes) {
   inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, n - 1.0);
   inputs.instants.tail(20).array() += 5.0;  // a gap before row 40
   inputs.cutoff = 0.05;
-  const RowFilter filter(inputs);
+  const Recording recording(inputs);
+  const RowFilter& filter = recording.filter();
   ASSERT_EQ(filter.pieces().size(), 2u);
   EXPECT_NEAR(filter.weights().sum(), 1.0, 1e-12);
   Eigen::VectorXd values(n);
@@ -41,7 +41,7 @@ TEST(FilteredRows, AreWeightedSumsThatEndWhereTheRecordingDoes) {
     }
     EXPECT_NEAR(filtered(i, 0), sum / weight, 1e-12) << i;
   }
-  EXPECT_EQ(as_measured({{"x"}, inputs.values}, values), values);
+  EXPECT_EQ(Recording({{"x"}, inputs.values}).as_measured(values), values);
 }
 
 TEST(FilteredRows, ThatAreTooFewOrTooFarApartAreRefused) {
@@ -73,7 +73,8 @@ TEST(FilteredRows, AJumpBetweenRowsCountsWhereItIs) {
     inputs.instants = inputs.values.col(0);
     inputs.values.array() -= place;
     inputs.cutoff = 0.05;
-    const RowFilter filter(inputs);
+    const Recording recording(inputs);
+    const RowFilter& filter = recording.filter();
     const Eigen::VectorXd sign = inputs.values.col(0).cwiseSign();
     const Eigen::VectorXd line = 3.0 * inputs.values.col(0);
     const Eigen::Index half = filter.weights().size() / 2;
@@ -172,7 +173,8 @@ TEST(Regimes, AStepBeyondAThresholdHasErrorsOfBoth) {
       terms, [](const ModelTerm& term) { return term.family == "step" && term.location == "a where b > c"; });
   ASSERT_NE(step, terms.end());
   const Simulation simulation = tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"});
-  const TermModel model(simulation, inputs, {"y"}, terms);
+  const Recording recording(inputs);
+  const TermModel model(simulation, recording, {"y"}, terms);
   const TermData data{.samples = points, .measured = measured, .sigma = Eigen::VectorXd::Ones(1), .stretches = {}};
   const auto index = static_cast<std::size_t>(step - terms.begin());
   TermFit fit = fit_terms(model, data, Eigen::Vector2d(0.0, 1.0),

@@ -6,8 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "discovery/terms/motion.hpp"
-#include "discovery/terms/standstill.hpp"
+#include "discovery/recording/speeds.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "noise.hpp"
@@ -59,12 +58,12 @@ TEST(Motion, SpeedIsTakenFromThePositionThatIsBetterKnown) {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     Eigen::MatrixXd noisy = truth;
     add_noise(noisy, {1e-4, 0.03, 0.2}, seed);
-    const SmoothedInputs smooth = smoothed(inputs_of(noisy), force(noisy));
+    const SmoothedInputs smooth = smoothed(Recording(inputs_of(noisy)), force(noisy));
     ASSERT_EQ(smooth.notes.size(), 1u);
-    EXPECT_LT(rms(smooth.inputs.values.col(1) - truth.col(1)), 0.03 / 3.0);
-    EXPECT_EQ(smooth.inputs.values.col(2), noisy.col(2));
+    EXPECT_LT(rms(smooth.recording.inputs().values.col(1) - truth.col(1)), 0.03 / 3.0);
+    EXPECT_EQ(smooth.recording.inputs().values.col(2), noisy.col(2));
     // The simulation follows: it was computed at the noisy speed.
-    const Eigen::VectorXd expected = smooth.inputs.values.col(1) - noisy.col(1);
+    const Eigen::VectorXd expected = smooth.recording.inputs().values.col(1) - noisy.col(1);
     EXPECT_LT(rms(smooth.change.col(0) - expected), 1e-6);
   }
 }
@@ -72,11 +71,11 @@ TEST(Motion, SpeedIsTakenFromThePositionThatIsBetterKnown) {
 TEST(Motion, SpeedThatIsWellKnownStays) {
   Eigen::MatrixXd noisy = moving();
   add_noise(noisy, {0.02, 1e-3, 0.2}, 1);
-  EXPECT_EQ(smoothed(inputs_of(noisy), force(noisy)).change.size(), 0);
-  EXPECT_EQ(smoothed(inputs_of(moving()), force(moving())).change.size(), 0);
+  EXPECT_EQ(smoothed(Recording(inputs_of(noisy)), force(noisy)).change.size(), 0);
+  EXPECT_EQ(smoothed(Recording(inputs_of(moving())), force(moving())).change.size(), 0);
   Inputs independent = inputs_of(noisy);
   independent.instants.resize(0);
-  EXPECT_EQ(smoothed(independent, force(noisy)).change.size(), 0);
+  EXPECT_EQ(smoothed(Recording(independent), force(noisy)).change.size(), 0);
 }
 
 // The acceleration jumps at each reversal, as dry friction makes it: no polynomial goes through.
@@ -92,8 +91,8 @@ TEST(Motion, SpeedStaysAsItIsWhereTheAccelerationJumps) {
   }
   Eigen::MatrixXd noisy = truth;
   add_noise(noisy, {1e-4, 0.02, 0.02}, 1);
-  const SmoothedInputs smooth = smoothed(inputs_of(noisy), force(noisy));
-  EXPECT_EQ(smooth.inputs.values, noisy);
+  const SmoothedInputs smooth = smoothed(Recording(inputs_of(noisy)), force(noisy));
+  EXPECT_EQ(smooth.recording.inputs().values, noisy);
 }
 
 // Moves with rests between them, each at a constant acceleration and its opposite.
@@ -209,10 +208,10 @@ TEST(Reversals, StribecksFrictionHasItsName) {
 TEST(Rest, SignalThatPassesZeroHasNoBand) {
   const Inputs inputs = inputs_of(moving());
   const Eigen::MatrixXd jump = inputs.values.col(1).array().sign().matrix();
-  EXPECT_EQ(zero_bands(inputs, jump).maxCoeff(), 0.0);
+  EXPECT_EQ(zero_bands(Recording(inputs), jump).maxCoeff(), 0.0);
   // And rests do not matter where nothing jumps.
   const Inputs resting = with_rests(1);
-  EXPECT_EQ(zero_bands(resting, resting.values.col(1)).maxCoeff(), 0.0);
+  EXPECT_EQ(zero_bands(Recording(resting), resting.values.col(1)).maxCoeff(), 0.0);
 }
 
 TEST(Rest, SimulationOfTheWrongShapeIsRefused) {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "discovery/terms/fitted_parameters.hpp"
+#include "discovery/answer/findings.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/random.hpp"
 

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "discovery/terms/standstill.hpp"
-#include "discovery/terms/surrogate.hpp"
+#include "discovery/recording/speeds.hpp"
+#include "discovery/recording/surrogate.hpp"
 #include "llmt/random.hpp"
 
 namespace llmt::discovery {
@@ -45,8 +45,8 @@ TEST(Rests, OfAMotionOnlyTheSpeedRests) {
   const Inputs inputs = stop_and_go();
   for (const Eigen::Index j : {1, 2}) {
     const Eigen::MatrixXd jump = inputs.values.col(j).cwiseSign();
-    EXPECT_GT(zero_bands(column_of(inputs, j), jump)(0), 0.0) << j;  // alone it may be a speed
-    const Eigen::VectorXd bands = zero_bands(inputs, jump);
+    EXPECT_GT(zero_bands(Recording(column_of(inputs, j)), jump)(0), 0.0) << j;  // alone it may be a speed
+    const Eigen::VectorXd bands = zero_bands(Recording(inputs), jump);
     EXPECT_EQ(bands(0), 0.0) << j;
     EXPECT_EQ(bands(2), 0.0) << j;
     if (j == 1) {

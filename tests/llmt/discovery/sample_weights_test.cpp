@@ -1,5 +1,5 @@
 // How much each sample counts.
-#include "discovery/terms/sample_weights.hpp"
+#include "discovery/answer/errors_of_inputs.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <functional>
 #include <utility>
 
-#include "discovery/terms/row_filter.hpp"
+#include "discovery/recording/recording.hpp"
 #include "filtered_log.hpp"
 #include "llmt/random.hpp"
 
@@ -43,15 +43,15 @@ TEST(ErrorsOfSteps, AreThoseOfAFilterOfFinerRows) {
     inputs.cutoff = 2.6;
     return inputs;
   };
-  const Inputs coarse = inputs_of(n + 1);
-  const Inputs fine = inputs_of(finer * n + 1);
+  const Recording coarse(inputs_of(n + 1));
+  const Recording fine(inputs_of(finer * n + 1));
   const auto error = [&](const std::function<double(double)>& signal) {
-    const Eigen::MatrixXd exact = RowFilter(fine)(fine.values.col(0).unaryExpr(signal));
-    const Eigen::MatrixXd values = coarse.values.col(0).unaryExpr(signal);
-    const Eigen::MatrixXd filtered = RowFilter(coarse)(values);
+    const Eigen::MatrixXd exact = fine.as_measured(fine.inputs().values.col(0).unaryExpr(signal));
+    const Eigen::MatrixXd values = coarse.inputs().values.col(0).unaryExpr(signal);
+    const Eigen::MatrixXd filtered = coarse.as_measured(values);
     double worst = 0.0;
     for (Eigen::Index i = 0; i <= n; ++i) worst = std::max(worst, std::abs(filtered(i, 0) - exact(finer * i, 0)));
-    return std::pair(worst, std::sqrt(squared_errors_of_steps(coarse, values).maxCoeff()));
+    return std::pair(worst, std::sqrt(coarse.squared_errors_of_steps(values).maxCoeff()));
   };
   const auto [narrow, said] = error([](double x) { return std::exp(-std::abs((x - 0.1137) / 0.004)); });
   EXPECT_GT(said, 0.3 * narrow);

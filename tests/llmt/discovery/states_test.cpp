@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string>
 
-#include "discovery/terms/memory_terms.hpp"
+#include "discovery/terms/term_builders.hpp"
 #include "filtered_log.hpp"
 
 namespace states_test {

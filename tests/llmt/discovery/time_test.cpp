@@ -6,10 +6,10 @@
 #include <numbers>
 #include <set>
 
-#include "discovery/terms/correlation.hpp"
-#include "discovery/terms/held_out.hpp"
-#include "discovery/terms/row_split.hpp"
-#include "discovery/terms/samples.hpp"
+#include "discovery/answer/judges.hpp"
+#include "discovery/recording/noise.hpp"
+#include "discovery/recording/row_split.hpp"
+#include "discovery/recording/samples.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 

@@ -9,11 +9,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include "discovery/terms/derivatives.hpp"
-#include "discovery/terms/memory_terms.hpp"
-#include "discovery/terms/motion.hpp"
-#include "discovery/terms/resonance.hpp"
-#include "discovery/terms/surrogate.hpp"
+#include "discovery/recording/recording.hpp"
+#include "discovery/terms/term_builders.hpp"
+#include "discovery/terms/term_model.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "llmt/random.hpp"
 
@@ -30,8 +28,7 @@ class OfRows {
     const bool is_known = derivatives_ && instants_.size() == rows.instants.size() && instants_ == rows.instants &&
                           sequence_ == rows.sequence;
     if (!is_known) {
-      constexpr Eigen::Index lags = 2;
-      derivatives_.emplace(rows, interpolates_ ? 2 : lags * smooth_lag(rows, signals));
+      derivatives_.emplace(rows, interpolates_ ? 2 : lags_of_a_window * smooth_lag(rows, signals));
       instants_ = rows.instants;
       sequence_ = rows.sequence;
     }
@@ -83,8 +80,8 @@ struct SimulatedParts {
 
 SimulatedParts parts_of(const Surrogate& surrogate, const Rows& rows, Eigen::Index output) {
   // A function that does not describe the simulation knows no jumps of it.
-  constexpr double described = 0.9;
-  if (surrogate.described()(output) < described) return {rows.simulated, Eigen::VectorXd::Zero(rows.simulated.size())};
+  if (surrogate.described()(output) < roughly_described)
+    return {rows.simulated, Eigen::VectorXd::Zero(rows.simulated.size())};
   Eigen::VectorXd jumps = surrogate.jumps(rows.inputs).col(output);
   return {rows.simulated - jumps, jumps};
 }
@@ -139,9 +136,6 @@ ModelTerm delay(const std::shared_ptr<OfRows>& of_rows, const std::shared_ptr<co
 }
 
 ModelTerm resonance(const std::string& output, std::vector<double> frequencies) {
-  const auto constant = [](std::string name, std::string unit, std::vector<double> tried) {
-    return TermConstant{.name = std::move(name), .unit = std::move(unit), .tried = std::move(tried)};
-  };
   return {.family = "resonance",
           .location = "",
           .formula =
@@ -150,13 +144,9 @@ ModelTerm resonance(const std::string& output, std::vector<double> frequencies) 
           .inputs = {},
           .coefficients = {"share"},
           .columns = [](const Rows& rows, const Eigen::VectorXd& constants) -> Eigen::MatrixXd {
-            constexpr double least = 1e-3;
-            constexpr double most = 0.2;  // more is a filter: it hardly rings
-            return -resonant_part(rows, rows.simulated, std::max(constants(0), 1e-300),
-                                  std::clamp(constants(1), least, most));
+            return ringing(rows, rows.simulated, constants);
           },
-          .constants = {constant("frequency", "per unit of time", std::move(frequencies)),
-                        constant("damping ratio", "1", {0.02, 0.04, 0.08, 0.16})},
+          .constants = constants_of_ringing(std::move(frequencies)),
           .output = output,
           .inner_state = "a resonance, as of a load behind a spring",
           .shown_by = "an encoder or an accelerometer at the load",
@@ -222,21 +212,19 @@ double noise_of_second(const Derivatives& derivatives, const Rows& rows, const E
 
 std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::MatrixXd& simulated,
                                          const std::vector<std::string>& outputs) {
-  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
+  const Recording recording(inputs);
+  const Rows& rows = recording.rows();
   if (simulated.rows() != inputs.values.rows() || simulated.cols() != std::ssize(outputs)) {
     throw std::invalid_argument(
         fmt::format("llmt::discovery::inner_state_terms: {} x {} simulated outputs, must be {} x {}", simulated.rows(),
                     simulated.cols(), inputs.values.rows(), outputs.size()));
   }
   std::vector<ModelTerm> terms;
-  constexpr Eigen::Index fewest = 60;
-  if (inputs.values.rows() < fewest || !simulated.allFinite()) return terms;
+  if (inputs.values.rows() < fewest_for_derivatives || !simulated.allFinite()) return terms;
   const auto of_rows = std::make_shared<OfRows>();
-  const auto surrogate = std::make_shared<const Surrogate>(inputs.values, simulated);
+  const auto surrogate = recording.surrogate(simulated);
   const auto slopes = std::make_shared<SlopesOfSimulation>(surrogate);
-  const std::vector<Motion> all = motions(of_rows->at(rows, inputs.values), inputs);
-  // Less than this, and the derivatives of the function are not those of the simulation.
-  constexpr double described = 0.98;
+  const std::vector<Motion>& all = recording.axes();
   constexpr double largest_noise_share = 0.3;
   for (std::size_t o = 0; o < outputs.size(); ++o) {
     const Eigen::VectorXd output = simulated.col(static_cast<Eigen::Index>(o));
@@ -249,7 +237,7 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
       for (std::size_t k = 0; k < term.constants.size(); ++k) constants(k) = term.constants[k].tried.front();
       const Eigen::MatrixXd columns = term.columns(here, constants);
       term.lower = Eigen::VectorXd::Zero(columns.cols());
-      term.upper = (far * output.norm() / columns.colwise().norm().array().max(1e-300)).matrix().transpose();
+      term.upper = (far * output.norm() / columns.colwise().norm().array().max(smallest_divisor)).matrix().transpose();
     };
     const auto place = static_cast<Eigen::Index>(o);
     terms.push_back(delay(of_rows, surrogate, rows, inputs.cutoff > 0.0, outputs[o], place));
@@ -263,10 +251,10 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
       terms.back().lower = Eigen::VectorXd::Zero(1);
       terms.back().upper = Eigen::VectorXd::Ones(1);
     }
-    std::ranges::move(memory_terms(inputs, rows, all, outputs[o]), std::back_inserter(terms));
-    if (surrogate->described()(place) < described) continue;
+    std::ranges::move(memory_terms(recording, outputs[o]), std::back_inserter(terms));
+    if (surrogate->described()(place) < well_described) continue;
     // The spring's term holds the second derivative of the simulated output, which should not be noise.
-    if (noise_of_second(of_rows->at(rows, inputs.values), rows, parts_of(*surrogate, here, place).smooth) >
+    if (noise_of_second(recording.derivatives(), rows, parts_of(*surrogate, here, place).smooth) >
         largest_noise_share) {
       continue;
     }

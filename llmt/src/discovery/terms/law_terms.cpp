@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "discovery/terms/term_builders.hpp"
+#include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -62,16 +63,16 @@ std::vector<ModelTerm> sigmoids(const InputView& input) {
   return {law(input, "sigmoid", fmt::format("1/(1 + exp(-({} - c)/w))", input.name), "height", "", constants,
               "1/(1+exp(-($1-$c)/$d))",
               [](const Eigen::ArrayXd& x, const Eigen::VectorXd& c) -> Eigen::ArrayXd {
-                return (1.0 + ((c(0) - x) / std::max(c(1), 1e-300)).min(largest_exponent).exp()).inverse();
+                return (1.0 + ((c(0) - x) / std::max(c(1), smallest_divisor)).min(largest_exponent).exp()).inverse();
               }),
           law(input, "sigmoid", fmt::format("1/(1 + exp(({} - c)/w))", input.name), "height", "", constants,
               "1/(1+exp(($1-$c)/$d))", [](const Eigen::ArrayXd& x, const Eigen::VectorXd& c) -> Eigen::ArrayXd {
-                return (1.0 + ((x - c(0)) / std::max(c(1), 1e-300)).min(largest_exponent).exp()).inverse();
+                return (1.0 + ((x - c(0)) / std::max(c(1), smallest_divisor)).min(largest_exponent).exp()).inverse();
               })};
 }
 
 Eigen::ArrayXd falling_hill(const Eigen::ArrayXd& x, const Eigen::VectorXd& constants) {
-  return (1.0 + (x / std::max(constants(0), 1e-300)).max(0.0).pow(constants(1))).inverse();
+  return (1.0 + (x / std::max(constants(0), smallest_divisor)).max(0.0).pow(constants(1))).inverse();
 }
 
 std::vector<ModelTerm> hills(const InputView& input) {
@@ -167,9 +168,8 @@ bool changes_sign(const InputView& input) { return input.low < 0.0 && input.high
 }  // namespace
 
 std::vector<ModelTerm> law_terms(const InputView& input) {
-  constexpr std::size_t fewest = 8;
   std::vector<ModelTerm> terms;
-  if (input.distinct.size() < fewest) return terms;
+  if (input.distinct.size() < fewest_values_of_a_search) return terms;
   terms = sigmoids(input);
   if (input.low >= 0.0) {
     for (ModelTerm& term : hills(input)) terms.push_back(std::move(term));
@@ -184,7 +184,6 @@ std::vector<ModelTerm> law_terms(const InputView& input) {
 }
 
 std::vector<ModelTerm> load_frictions(const std::vector<InputView>& inputs) {
-  constexpr std::size_t most = 8;
   std::vector<ModelTerm> terms;
   for (const InputView& speed : inputs) {
     if (!changes_sign(speed) || speed.distinct.size() < 3) continue;
@@ -192,7 +191,7 @@ std::vector<ModelTerm> load_frictions(const std::vector<InputView>& inputs) {
     terms.push_back(friction(
         "load_friction", v, fmt::format("sign({}) |simulated output|", v), {v}, "simulated",
         [](const Rows& rows) -> Eigen::ArrayXd { return rows.simulated.array(); }, speed.column, "sign($1)*abs($s)"));
-    if (inputs.size() > most) continue;
+    if (inputs.size() > most_inputs_of_pairs) continue;
     for (const InputView& load : inputs) {
       if (load.column == speed.column || load.distinct.size() < 3) continue;
       const std::string& x = load.name;

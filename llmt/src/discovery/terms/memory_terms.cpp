@@ -1,16 +1,118 @@
-#include "discovery/terms/memory_terms.hpp"
-
+// Terms of states that follow the inputs slowly, or swing behind them.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <utility>
 
-#include "discovery/terms/derivatives.hpp"
-#include "discovery/terms/resonance.hpp"
+#include "discovery/recording/derivatives.hpp"
+#include "discovery/recording/noise.hpp"
+#include "discovery/terms/term_builders.hpp"
+#include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
+namespace {
+
+// z'' + 2 zeta w z' + w^2 z = u, from one row to the next.
+class Oscillator {
+ public:
+  Oscillator(double frequency, double damping) : omega_(2.0 * std::numbers::pi * frequency), damping_(damping) {}
+
+  void rest(double u) {
+    z_ = u / (omega_ * omega_);
+    speed_ = 0.0;
+  }
+
+  // u goes from `before` to `now` in a straight line.
+  void step(double before, double now, double duration) {
+    if (std::abs(duration - duration_) > same_time * duration) prepare(duration);
+    const double slope = (now - before) / duration;
+    const double square = omega_ * omega_;
+    const double lag = 2.0 * damping_ * slope / (square * omega_);
+    const double z = z_ - before / square + lag;
+    const double speed = speed_ - slope / square;
+    z_ = z_by_z_ * z + z_by_speed_ * speed + now / square - lag;
+    speed_ = speed_by_z_ * z + speed_by_speed_ * speed + slope / square;
+  }
+
+  // z''
+  double acceleration(double u) const { return u - 2.0 * damping_ * omega_ * speed_ - omega_ * omega_ * z_; }
+
+ private:
+  double omega_;
+  double damping_;
+  double duration_ = 0.0;
+  double z_ = 0.0;
+  double speed_ = 0.0;
+  double z_by_z_ = 1.0;
+  double z_by_speed_ = 0.0;
+  double speed_by_z_ = 0.0;
+  double speed_by_speed_ = 1.0;
+
+  void prepare(double duration) {
+    const double damped = omega_ * std::sqrt(1.0 - damping_ * damping_);
+    const double decay = std::exp(-damping_ * omega_ * duration);
+    const double cosine = decay * std::cos(damped * duration);
+    const double sine = decay * std::sin(damped * duration) / damped;
+    z_by_z_ = cosine + damping_ * omega_ * sine;
+    z_by_speed_ = sine;
+    speed_by_z_ = -omega_ * omega_ * sine;
+    speed_by_speed_ = cosine - damping_ * omega_ * sine;
+    duration_ = duration;
+  }
+};
+
+}  // namespace
+
+Eigen::VectorXd resonant_part(const Rows& rows, const Eigen::VectorXd& signal, double frequency, double damping) {
+  const double longest = std::max(1.0 / frequency, interruption * median_step(rows));
+  Oscillator oscillator(frequency, damping);
+  Eigen::VectorXd part(signal.size());
+  for (std::size_t k = 0; k < rows.sequence.size(); ++k) {
+    const Eigen::Index row = rows.sequence[k];
+    const double now = signal(row);
+    const Eigen::Index before = k > 0 ? rows.sequence[k - 1] : row;
+    const double duration = rows.instants(row) - rows.instants(before);
+    if (duration > 0.0 && duration <= longest) {
+      oscillator.step(signal(before), now, duration);
+    } else {
+      oscillator.rest(now);
+    }
+    part(row) = oscillator.acceleration(now);
+  }
+  return part;
+}
+
+std::vector<double> resonant_frequencies(const Rows& rows) {
+  constexpr double lag_of_a_period = 0.1;  // see smooth_lag()
+  constexpr double steps_of_a_period = 3.0;
+  constexpr double ratio = 1.08;
+  constexpr int most = 40;
+  const double step = median_step(rows);
+  if (!(step > 0.0)) return {};
+  const double lowest = lag_of_a_period / (step * static_cast<double>(smooth_lag(rows, rows.simulated)));
+  const double highest = 1.0 / (steps_of_a_period * step);
+  const int count = std::min(most, static_cast<int>(std::log(highest / lowest) / std::log(ratio)) + 1);
+  std::vector<double> values;
+  for (int k = 0; k < count; ++k) {
+    values.push_back(lowest * std::pow(highest / lowest, k / std::max(1.0, static_cast<double>(count - 1))));
+  }
+  return values;
+}
+
+std::vector<TermConstant> constants_of_ringing(std::vector<double> frequencies) {
+  return {{.name = "frequency", .unit = "per unit of time", .tried = std::move(frequencies)},
+          {.name = "damping ratio", .unit = "1", .tried = {0.02, 0.04, 0.08, 0.16}}};
+}
+
+Eigen::VectorXd ringing(const Rows& rows, const Eigen::VectorXd& signal, const Eigen::VectorXd& constants) {
+  constexpr double least = 1e-3;
+  constexpr double most = 0.2;
+  return -resonant_part(rows, signal, std::max(constants(0), smallest_divisor), std::clamp(constants(1), least, most));
+}
+
 namespace {
 
 constexpr int simple = 12;  // after the terms of the row itself, see ModelTerm::complexity
@@ -82,8 +184,7 @@ ModelTerm slow_state(std::string family, const std::string& input, std::string f
   term.coefficients = {"coefficient"};
   term.per = std::move(per);
   term.columns = [column = std::move(column), place](const Rows& rows, const Eigen::VectorXd& constants) {
-    constexpr double least = 1e-300;
-    return Eigen::MatrixXd(column(rows, rows.inputs.col(place), std::max(least, constants(0))));
+    return Eigen::MatrixXd(column(rows, rows.inputs.col(place), std::max(smallest_divisor, constants(0))));
   };
   term.constants = {{.name = "time constant", .unit = "units of time", .tried = times}};
   term.output = output;
@@ -104,13 +205,9 @@ ModelTerm swing(const std::string& input, std::vector<double> frequencies, Eigen
   term.coefficients = {"coefficient"};
   term.per = input;
   term.columns = [place](const Rows& rows, const Eigen::VectorXd& constants) -> Eigen::MatrixXd {
-    constexpr double least = 1e-3;
-    constexpr double most = 0.2;
-    return -resonant_part(rows, rows.inputs.col(place), std::max(constants(0), 1e-300),
-                          std::clamp(constants(1), least, most));
+    return ringing(rows, rows.inputs.col(place), constants);
   };
-  term.constants = {{.name = "frequency", .unit = "per unit of time", .tried = std::move(frequencies)},
-                    {.name = "damping ratio", .unit = "1", .tried = {0.02, 0.04, 0.08, 0.16}}};
+  term.constants = constants_of_ringing(std::move(frequencies));
   term.output = output;
   term.inner_state = "a resonance, as of a load that swings";
   term.shown_by = "an encoder or an accelerometer at the load";
@@ -140,11 +237,12 @@ Eigen::VectorXd lagged(const Rows& rows, const Eigen::VectorXd& signal, double t
   return z;
 }
 
-std::vector<ModelTerm> memory_terms(const Inputs& inputs, const Rows& rows, const std::vector<Motion>& motions,
-                                    const std::string& output) {
+std::vector<ModelTerm> memory_terms(const Recording& recording, const std::string& output) {
+  const Inputs& inputs = recording.inputs();
+  const Rows& rows = recording.rows();
   constexpr double ratio = 1.5;
   const double step = median_step(rows);
-  const double fast = step * static_cast<double>(smooth_lag(rows, inputs.values));  // a tenth of a period
+  const double fast = step * static_cast<double>(recording.lag());  // a tenth of a period
   const double whole = longest_run(rows);
   std::vector<ModelTerm> terms;
   if (!(step > 0.0) || !(whole > 10.0 * fast)) return terms;
@@ -153,24 +251,24 @@ std::vector<ModelTerm> memory_terms(const Inputs& inputs, const Rows& rows, cons
   for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
     const std::string& x = inputs.names[static_cast<std::size_t>(j)];
     if (!(inputs.values.col(j).maxCoeff() > inputs.values.col(j).minCoeff())) continue;
-    using Signal = Eigen::VectorXd;
+    using Column = Eigen::VectorXd;
     terms.push_back(slow_state(
         "memory", x, fmt::format("{0} - lag {0}, tau d(lag)/dt = {0} - lag", x), x, times,
-        [](const Rows& own, const Signal& v, double tau) -> Signal { return v - lagged(own, v, tau, true); }, j,
+        [](const Rows& own, const Column& v, double tau) -> Column { return v - lagged(own, v, tau, true); }, j,
         output));
     terms.push_back(slow_state(
         "warming", x, fmt::format("{0} lag {0}^2, tau d(lag)/dt = {0}^2 - lag", x), x + "^3", times,
-        [](const Rows& own, const Signal& v, double tau) -> Signal {
+        [](const Rows& own, const Column& v, double tau) -> Column {
           return v.cwiseProduct(lagged(own, v.cwiseAbs2(), tau, false));
         },
         j, output));
     terms.push_back(slow_state(
         "warmth", x, fmt::format("lag {0}^2, tau d(lag)/dt = {0}^2 - lag", x), x + "^2", times,
-        [](const Rows& own, const Signal& v, double tau) -> Signal { return lagged(own, v.cwiseAbs2(), tau, false); },
+        [](const Rows& own, const Column& v, double tau) -> Column { return lagged(own, v.cwiseAbs2(), tau, false); },
         j, output));
   }
   std::vector<Eigen::Index> moving;
-  for (const Motion& motion : motions) {
+  for (const Motion& motion : recording.axes()) {
     moving.push_back(motion.speed);
     moving.push_back(motion.acceleration);
   }

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "discovery/terms/term_builders.hpp"
+#include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -116,7 +117,7 @@ ModelTerm settling(const InputView& input) {
   return searched_term(input, "settling", fmt::format("exp(-{}/tau)", since), {"A"}, "",
                        smooth_constant(input, "tau", time_constants(input)),
                        [low = input.low](const Eigen::ArrayXd& values, double tau) -> Eigen::MatrixXd {
-                         return (-(values - low).max(0.0) / std::max(tau, 1e-300)).exp().matrix();
+                         return (-(values - low).max(0.0) / std::max(tau, smallest_divisor)).exp().matrix();
                        },
                        {fmt::format("exp(-max(0, $1 - ({}))/$c)", input.low)});
 }
@@ -175,9 +176,8 @@ std::vector<double> thresholds(const std::vector<double>& distinct, std::size_t 
 }
 
 std::vector<ModelTerm> searched_terms(const InputView& input) {
-  constexpr std::size_t fewest = 8;
   std::vector<ModelTerm> terms;
-  if (input.distinct.size() < fewest) return terms;
+  if (input.distinct.size() < fewest_values_of_a_search) return terms;
   terms = {wave(input), step(input)};
   for (ModelTerm& term : hinges(input)) terms.push_back(std::move(term));
   terms.push_back(settling(input));
@@ -185,7 +185,9 @@ std::vector<ModelTerm> searched_terms(const InputView& input) {
     terms.push_back(one_function(
         input, "saturation", fmt::format("{0}/(c + {0})", input.name), "limit",
         smooth_constant(input, "c", time_constants(input)),
-        [](const Eigen::ArrayXd& x, double half) -> Eigen::ArrayXd { return x / (std::max(half, 1e-300) + x); },
+        [](const Eigen::ArrayXd& x, double half) -> Eigen::ArrayXd {
+          return x / (std::max(half, smallest_divisor) + x);
+        },
         "$1/($c + $1)"));
   }
   if (input.low < 0.0 && input.high > 0.0) {

@@ -4,12 +4,62 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
-#include "discovery/terms/refuse.hpp"
+#include "discovery/recording/refuse.hpp"
+#include "discovery/recording/row_split.hpp"
 #include "llmt/discovery/least_squares.hpp"
-#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
+
+ColumnCache::ColumnCache(const Recording& recording) : places_(recording.inputs().values.rows(), -1) {
+  MissingOptions nothing_aside;
+  nothing_aside.held_out_share = 0.0;
+  all_ = split_in_time(recording, nothing_aside, 1).searched;
+  for (Eigen::Index i = 0; i < all_.size(); ++i) places_[all_.rows()[i]] = i;
+}
+
+namespace {
+
+bool is_of_inputs_alone(const ModelTerm& term) {
+  return !term.inputs.empty() && !term.code.empty() && term.inner_state.empty() &&
+         std::ranges::none_of(term.code, [](const std::string& code) { return code.find("$s") != std::string::npos; });
+}
+
+}  // namespace
+
+bool ColumnCache::holds(const ModelTerm& term) { return term.constants.empty() && is_of_inputs_alone(term); }
+
+bool ColumnCache::is_state_of_inputs(const ModelTerm& term) {
+  return !term.constants.empty() && !term.inner_state.empty() && !term.inputs.empty();
+}
+
+bool ColumnCache::holds_grid(const ModelTerm& term) {
+  return (!term.constants.empty() && is_of_inputs_alone(term)) || is_state_of_inputs(term);
+}
+
+Eigen::MatrixXd ColumnCache::of_samples(const Eigen::MatrixXd& all, const Samples& samples) const {
+  std::vector<Eigen::Index> places(samples.size());
+  for (Eigen::Index i = 0; i < samples.size(); ++i) places[i] = places_[samples.rows_of(i).front()];
+  return all(places, Eigen::all);
+}
+
+Eigen::MatrixXd ColumnCache::at(const Samples& samples, std::size_t draw, std::size_t term,
+                                const std::function<Eigen::MatrixXd()>& columns) {
+  const auto [place, is_new] = columns_.try_emplace({draw, term});
+  if (is_new) place->second = means(columns(), all_);
+  return of_samples(place->second, samples);
+}
+
+Eigen::MatrixXd ColumnCache::grid_at(const Samples& samples, std::size_t term,
+                                     const std::vector<Eigen::VectorXd>& tried,
+                                     const std::function<Eigen::MatrixXd(const Samples&)>& columns) {
+  std::vector<double> values;
+  for (const Eigen::VectorXd& constants : tried) values.insert(values.end(), constants.begin(), constants.end());
+  const auto [place, is_new] = grids_.try_emplace({term, std::move(values)});
+  if (is_new) place->second = columns(all_);
+  return of_samples(place->second, samples);
+}
 
 Eigen::Index first_bad_row(const Eigen::MatrixXd& values) {
   Eigen::Index row = 0;
@@ -17,20 +67,20 @@ Eigen::Index first_bad_row(const Eigen::MatrixXd& values) {
   return row;
 }
 
-TermModel::TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
+TermModel::TermModel(const Simulation& simulation, const Recording& recording, std::vector<std::string> outputs,
                      const std::vector<ModelTerm>& terms, std::set<std::size_t> refuted)
     : simulation_(&simulation),
-      inputs_(&inputs),
+      recording_(&recording),
       outputs_(std::move(outputs)),
       terms_(&terms),
       refuted_(std::move(refuted)),
-      rows_(rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()))) {}
+      rows_(recording.rows()) {}
 
 Eigen::MatrixXd TermModel::evaluate(const Eigen::VectorXd& values) const {
-  Eigen::MatrixXd simulated = simulation_->predict(inputs_->values, values);
-  if (simulated.rows() != inputs_->values.rows() || simulated.cols() != std::ssize(outputs_)) {
+  Eigen::MatrixXd simulated = simulation_->predict(inputs().values, values);
+  if (simulated.rows() != inputs().values.rows() || simulated.cols() != std::ssize(outputs_)) {
     refuse("find_missing", fmt::format("the simulation gave {} x {} outputs, must be {} x {}", simulated.rows(),
-                                       simulated.cols(), inputs_->values.rows(), outputs_.size()));
+                                       simulated.cols(), inputs().values.rows(), outputs_.size()));
   }
   return simulated;
 }
@@ -94,10 +144,10 @@ Eigen::MatrixXd TermModel::predict(const Eigen::VectorXd& values, const std::vec
 }
 
 Eigen::VectorXd TermModel::input(const std::string& name) const {
-  const auto found = std::ranges::find(inputs_->names, name);
-  if (found == inputs_->names.end())
+  const auto found = std::ranges::find(inputs().names, name);
+  if (found == inputs().names.end())
     refuse("find_missing", fmt::format("a term depends on \"{}\", which is not an input", name));
-  return inputs_->values.col(found - inputs_->names.begin());
+  return inputs().values.col(found - inputs().names.begin());
 }
 
 std::string TermModel::label(const PlacedTerm& placed) const {
@@ -108,64 +158,44 @@ std::string TermModel::label(const PlacedTerm& placed) const {
   return text;
 }
 
-Eigen::VectorXd weights_of(const TermData& data, Eigen::Index output) {
-  if (!data.weights) return Eigen::VectorXd::Ones(data.samples.size());
-  return means_of_filtered(data.weights->col(output), data.samples);
-}
-
-Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
-                                 const std::vector<PlacedTerm>& placed) {
-  const Eigen::MatrixXd& simulated = model.simulated(parameters);
-  Eigen::MatrixXd predicted = means(simulated, data.samples);
-  for (const PlacedTerm& term : placed) {
-    predicted.col(term.output) += model.means_of(term, simulated, data.samples) * term.coefficients;
-  }
-  const Eigen::Index d = data.measured.cols();
-  Eigen::VectorXd residuals(data.measured.size());
-  for (Eigen::Index o = 0; o < d; ++o) {
-    residuals(Eigen::seqN(o, data.measured.rows(), d)) =
-        (data.measured.col(o) - predicted.col(o)).cwiseProduct(weights_of(data, o)) / data.sigma(o);
-  }
-  return residuals;
-}
-
-Eigen::MatrixXd baseline_jacobian(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
-                                  const std::vector<PlacedTerm>& placed) {
-  LeastSquaresProblem problem;
-  problem.parameters = model.parameters();
-  problem.residual = [&](const Eigen::VectorXd& values) { return scaled_residuals(model, data, values, placed); };
-  std::vector<Eigen::Index> free;
-  for (std::size_t k = 0; k < problem.parameters.size(); ++k) {
-    if (problem.parameters[k].free) free.push_back(k);
-  }
-  if (free.empty()) return Eigen::MatrixXd(data.measured.size(), 0);
-  return -difference_jacobian(problem, parameters)(Eigen::all, free);
-}
-
-Eigen::MatrixXd stacked_signature(const TermModel& model, const TermData& data, const PlacedTerm& placed,
-                                  const Eigen::MatrixXd& simulated) {
-  const Eigen::MatrixXd of_samples = model.means_of(placed, simulated, data.samples);
-  const Eigen::Index d = data.measured.cols();
-  Eigen::MatrixXd signature = Eigen::MatrixXd::Zero(data.measured.size(), of_samples.cols());
-  const Eigen::VectorXd scale = weights_of(data, placed.output) / data.sigma(placed.output);
-  signature(Eigen::seqN(placed.output, data.measured.rows(), d), Eigen::all) = scale.asDiagonal() * of_samples;
-  return signature;
-}
-
 Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& missing,
-                                 const std::vector<ModelTerm>& terms, const Inputs& elsewhere) {
-  Inputs inputs = elsewhere;
-  if (inputs.zero_bands.size() == 0) inputs.zero_bands = missing.zero_bands;
+                                 const std::vector<ModelTerm>& terms, const Recording& elsewhere) {
+  const bool has_bands = elsewhere.inputs().zero_bands.size() > 0;
+  const Recording recording = has_bands ? elsewhere : elsewhere.with_zero_bands(missing.zero_bands);
   std::vector<std::string> outputs;
   for (const Gap& gap : missing.gaps) outputs.push_back(gap.output);
-  const TermModel model(simulation, inputs, outputs, terms);
-  Eigen::VectorXd values(std::ssize(missing.parameters));
-  for (std::size_t k = 0; k < missing.parameters.size(); ++k) values(k) = missing.parameters[k].value;
+  return TermModel(simulation, recording, outputs, terms).predict(values_of(missing.parameters), placed_terms(missing));
+}
+
+Eigen::VectorXd values_of(const std::vector<Parameter>& parameters) {
+  Eigen::VectorXd values(std::ssize(parameters));
+  for (std::size_t k = 0; k < parameters.size(); ++k) values(static_cast<Eigen::Index>(k)) = parameters[k].value;
+  return values;
+}
+
+std::vector<PlacedTerm> placed_terms(const Missing& missing) {
   std::vector<PlacedTerm> placed;
   for (const FoundTerm& found : missing.found) {
     placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
   }
-  return model.predict(values, placed);
+  return placed;
+}
+
+Eigen::VectorXd within_range(const ModelTerm& term, Eigen::VectorXd constants) {
+  for (Eigen::Index k = 0; k < constants.size(); ++k) {
+    const std::vector<double>& tried = term.constants[static_cast<std::size_t>(k)].tried;
+    double low = tried.front() - spacing(tried, tried.front());
+    if (tried.front() > 0.0) low = std::max(low, 0.5 * tried.front());
+    constants(k) = std::clamp(constants(k), low, tried.back() + spacing(tried, tried.back()));
+  }
+  return constants;
+}
+
+double spacing(const std::vector<double>& tried, double value) {
+  if (tried.size() < 2) return std::max(smallest_divisor, 0.01 * std::abs(value));
+  const auto above = std::ranges::lower_bound(tried, value);
+  const auto k = std::clamp<Eigen::Index>(above - tried.begin(), 1, std::ssize(tried) - 1);
+  return std::max(smallest_divisor, tried[k] - tried[k - 1]);
 }
 
 }  // namespace llmt::discovery

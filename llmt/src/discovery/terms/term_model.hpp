@@ -1,16 +1,24 @@
-// A simulation with terms added: prediction, refit, trial of constants.
+// A simulation with terms added, and the columns of terms.
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
+#include <functional>
+#include <map>
 #include <memory>
 #include <set>
+#include <utility>
 #include <vector>
 
-#include "discovery/terms/column_cache.hpp"
-#include "discovery/terms/samples.hpp"
+#include "discovery/recording/recording.hpp"
+#include "discovery/recording/samples.hpp"
 #include "llmt/discovery/missing.hpp"
 #include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
+
+/// Where a value may be 0, as a constant on the way of a fit, this is divided by.
+inline constexpr double smallest_divisor = 1e-300;
 
 /// A term on one output with its constants and coefficients.
 struct PlacedTerm {
@@ -25,10 +33,45 @@ struct PlacedTerm {
   bool is_held(Eigen::Index coefficient) const { return !held.empty() && held[coefficient]; }
 };
 
+/// A term without constants that is a function of the inputs alone is the same in every search of the same rows. It is
+/// computed at all rows and filtered once, at all rows that may be samples.
+class ColumnCache {
+ public:
+  /// Of filtered rows.
+  explicit ColumnCache(const Recording& recording);
+
+  static bool holds(const ModelTerm& term);
+
+  /// Whether a term with constants is a function of the inputs alone.
+  static bool holds_grid(const ModelTerm& term);
+
+  /// Whether it is one of their past: a state that they move.
+  static bool is_state_of_inputs(const ModelTerm& term);
+
+  /// samples x k. `draw`: 0 for the inputs as they are, else the number of the draw of their errors. `columns` computes
+  /// them at all rows.
+  Eigen::MatrixXd at(const Samples& samples, std::size_t draw, std::size_t term,
+                     const std::function<Eigen::MatrixXd()>& columns);
+
+  /// samples x m: columns of a term with constants at all values of them that are tried. `columns` computes them at the
+  /// samples it is given.
+  Eigen::MatrixXd grid_at(const Samples& samples, std::size_t term, const std::vector<Eigen::VectorXd>& tried,
+                          const std::function<Eigen::MatrixXd(const Samples&)>& columns);
+
+ private:
+  Samples all_;
+  std::vector<Eigen::Index> places_;  // of each row among them; -1: none
+  std::map<std::pair<std::size_t, std::size_t>, Eigen::MatrixXd> columns_;
+  std::map<std::pair<std::size_t, std::vector<double>>, Eigen::MatrixXd> grids_;
+
+  Eigen::MatrixXd of_samples(const Eigen::MatrixXd& all, const Samples& samples) const;
+};
+
 /// Evaluates on all rows, those set aside included, because terms may depend on the inputs of the row before.
 class TermModel {
  public:
-  TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
+  /// Keeps references.
+  TermModel(const Simulation& simulation, const Recording& recording, std::vector<std::string> outputs,
             const std::vector<ModelTerm>& terms, std::set<std::size_t> refuted = {});
 
   /// Columns that searches share; `draw`: of the errors of the inputs, 0: none.
@@ -56,7 +99,8 @@ class TermModel {
   /// n x d.
   Eigen::MatrixXd predict(const Eigen::VectorXd& values, const std::vector<PlacedTerm>& placed) const;
 
-  const Inputs& inputs() const { return *inputs_; }
+  const Recording& recording() const { return *recording_; }
+  const Inputs& inputs() const { return recording_->inputs(); }
   /// Values of an input. Throws std::invalid_argument if there is none of that name.
   Eigen::VectorXd input(const std::string& name) const;
 
@@ -65,7 +109,7 @@ class TermModel {
 
  private:
   const Simulation* simulation_;
-  const Inputs* inputs_;
+  const Recording* recording_;
   std::vector<std::string> outputs_;
   const std::vector<ModelTerm>* terms_;
   std::set<std::size_t> refuted_;
@@ -79,76 +123,17 @@ class TermModel {
   Eigen::MatrixXd evaluate(const Eigen::VectorXd& values) const;
 };
 
-/// Samples that are fitted, measured outputs there, and how much an output's deviation counts.
-struct TermData {
-  Samples samples;
-  Eigen::MatrixXd measured;                                     // samples x d
-  Eigen::VectorXd sigma;                                        // d
-  std::vector<Eigen::Index> stretches;                          // RowSplit::stretches; empty: samples are not in time
-  double independent_share = 1.0;                               // of the samples, see search()
-  std::shared_ptr<const Eigen::MatrixXd> weights = {};          // roots, of rows x d, see weigh(); none: all 1
-  std::shared_ptr<const Eigen::MatrixXd> known_variances = {};  // of the errors of rows x d; none: see weigh()
-};
-
-/// Roots of the weights of the samples of an output.
-Eigen::VectorXd weights_of(const TermData& data, Eigen::Index output);
-
-/// Parameters and placed terms fitted together.
-struct TermFit {
-  Eigen::VectorXd parameters;
-  Eigen::VectorXd parameter_errors;
-  std::vector<PlacedTerm> placed;
-  std::vector<Eigen::VectorXd> errors;  // of the coefficients, then the constants, of each placed term
-};
-
-/// Holds the coefficients of whole terms at 1, and at 0 those whose column is, to a thousandth of its length, a
-/// combination of the derivatives by the free parameters and of the term's columns before it: C cos q + S sin q beside
-/// a mass, whose derivative is cos q, leaves S to the term and the rest to the mass.
-void hold(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
-          std::vector<PlacedTerm>& placed);
-
-TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
-                  const std::vector<PlacedTerm>& placed);
-
 /// What corrected() of llmt/discovery/simulation.hpp returns.
 Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& missing,
-                                 const std::vector<ModelTerm>& terms, const Inputs& inputs);
+                                 const std::vector<ModelTerm>& terms, const Recording& elsewhere);
 
-/// Autocorrelation of stacked residuals of samples in time, for each output, see autocorrelation(); d empty lists for
-/// samples that are not in time.
-std::vector<std::vector<double>> correlations_of(const TermData& data, const Eigen::VectorXd& residuals);
+Eigen::VectorXd values_of(const std::vector<Parameter>& parameters);
+
+/// The terms of an answer.
+std::vector<PlacedTerm> placed_terms(const Missing& missing);
 
 /// The first row with a value that is not finite, or the number of rows.
 Eigen::Index first_bad_row(const Eigen::MatrixXd& values);
-
-/// (measured - predicted) weight / sigma, stacked sample by sample.
-Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
-                                 const std::vector<PlacedTerm>& placed);
-
-/// Derivatives of -scaled_residuals() by the free parameters.
-Eigen::MatrixXd baseline_jacobian(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
-                                  const std::vector<PlacedTerm>& placed);
-
-/// Columns of a placed term, stacked like the residuals.
-Eigen::MatrixXd stacked_signature(const TermModel& model, const TermData& data, const PlacedTerm& placed,
-                                  const Eigen::MatrixXd& simulated);
-
-/// Residuals and nuisance that constants of terms are tried on.
-struct TrialGround {
-  Eigen::VectorXd residuals;  // stacked
-  Eigen::MatrixXd nuisance;   // stacked; what may explain residuals besides the term
-};
-
-/// The best constants of a term on one output, each with the prior cost of its choice; constants within two steps of
-/// those in `taken` do not count.
-std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& data, const TrialGround& ground,
-                                       std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
-                                       const std::vector<PlacedTerm>& taken);
-
-/// Distance from a constant, of this number, to the next value tried at which the sum of squares is larger by more than
-/// the variance of what is left.
-double trial_error(const TermModel& model, const TermData& data, const TrialGround& ground, const PlacedTerm& placed,
-                   Eigen::Index constant, const Eigen::MatrixXd& simulated);
 
 /// Constants within the values tried and a step beyond; those of positive constants stay positive. A fit may ask for
 /// others on its way, at which a term need not be finite.

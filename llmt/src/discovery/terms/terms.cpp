@@ -7,46 +7,15 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
-#include <set>
 #include <stdexcept>
 #include <string_view>
 
-#include "discovery/terms/refuse.hpp"
+#include "discovery/recording/recording.hpp"
+#include "discovery/recording/refuse.hpp"
 #include "discovery/terms/term_builders.hpp"
 
 namespace llmt::discovery {
 namespace {
-
-Eigen::Index order_column(const Inputs& inputs) {
-  const auto found = std::ranges::find(inputs.names, inputs.order);
-  if (found == inputs.names.end())
-    refuse("standard_terms", fmt::format("the order \"{}\" is not an input", inputs.order));
-  return found - inputs.names.begin();
-}
-
-void check(const Inputs& inputs) {
-  if (std::ssize(inputs.names) != inputs.values.cols()) {
-    refuse("standard_terms", fmt::format("{} names for {} columns", inputs.names.size(), inputs.values.cols()));
-  }
-  std::set<std::string> seen;
-  for (const std::string& name : inputs.names) {
-    if (name.empty()) refuse("standard_terms", "an input has no name");
-    if (!seen.insert(name).second) refuse("standard_terms", fmt::format("the input \"{}\" is there twice", name));
-  }
-  for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
-    if (!inputs.values.col(j).allFinite()) {
-      refuse("standard_terms", fmt::format("the input \"{}\" has a value that is not finite", inputs.names[j]));
-    }
-  }
-  const auto refuse_unlike = [](const char* what, Eigen::Index count, Eigen::Index expected) {
-    if (count > 0 && count != expected) refuse("standard_terms", fmt::format(fmt::runtime(what), count, expected));
-  };
-  refuse_unlike("{} instants for {} rows", inputs.instants.size(), inputs.values.rows());
-  refuse_unlike("{} labels of runs for {} rows", std::ssize(inputs.runs), inputs.values.rows());
-  refuse_unlike("{} zero bands for {} inputs", inputs.zero_bands.size(), inputs.values.cols());
-  if (!inputs.instants.allFinite()) refuse("standard_terms", "an instant is not finite");
-}
 
 // By the ending of the name; or by a usual name of a joint's angle, and values that radians may have.
 bool is_angle(const InputView& input) {
@@ -112,13 +81,11 @@ ModelTerm product(const InputView& a, const InputView& b) { return power_product
 ModelTerm square_product(const InputView& a, const InputView& b) { return power_product("square_product", a, 2, b); }
 
 std::vector<ModelTerm> products_of(const std::vector<InputView>& inputs) {
-  // With more inputs the choice among their squares times others would cost every term evidence.
-  constexpr std::size_t most = 8;
   std::vector<ModelTerm> terms;
   for (std::size_t a = 0; a < inputs.size(); ++a) {
     for (std::size_t b = a + 1; b < inputs.size(); ++b) terms.push_back(product(inputs[a], inputs[b]));
   }
-  if (inputs.size() > most) return terms;
+  if (inputs.size() > most_inputs_of_pairs) return terms;
   for (const InputView& a : inputs) {
     for (const InputView& b : inputs) {
       if (a.column != b.column && a.distinct.size() > 2) terms.push_back(square_product(a, b));
@@ -256,7 +223,7 @@ ModelTerm own_term(std::string name, std::string formula, std::function<double(c
 }
 
 std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableCause>* untestable) {
-  check(inputs);
+  check_inputs(inputs);
   if (!inputs.order.empty()) order_column(inputs);
   std::vector<InputView> moving;
   for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
@@ -285,47 +252,15 @@ std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<Untestab
 }
 
 std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string& input) {
-  check(inputs);
+  check_inputs(inputs);
   const auto place = std::ranges::find(inputs.names, input);
   if (place == inputs.names.end()) refuse("row_before_terms", fmt::format("\"{}\" is not an input", input));
   return sequence_terms(view(inputs, place - inputs.names.begin()), inputs.order);
 }
 
 Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
-  check(inputs);
-  const Eigen::Index n = inputs.values.rows();
-  Rows rows{.inputs = inputs.values,
-            .simulated = simulated,
-            .sequence = {},
-            .instants = Eigen::VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1))};
-  for (Eigen::Index j = 0; j < inputs.zero_bands.size(); ++j) {
-    rows.inputs.col(j) = (rows.inputs.col(j).array().abs() < inputs.zero_bands(j)).select(0.0, rows.inputs.col(j));
-  }
-  rows.sequence.resize(n);
-  std::iota(rows.sequence.begin(), rows.sequence.end(), 0);
-  if (inputs.instants.size() > 0) {
-    rows.instants = inputs.instants;
-    std::ranges::stable_sort(rows.sequence, {}, [&](Eigen::Index i) {
-      return std::pair(inputs.runs.empty() ? Eigen::Index{0} : inputs.runs[i], rows.instants(i));
-    });
-    // A run begins at 0, because a clock may go on from one run to the next.
-    Eigen::Index first = 0;
-    for (Eigen::Index k = 0; k < n && !inputs.runs.empty(); ++k) {
-      const Eigen::Index row = rows.sequence[k];
-      if (k == 0 || inputs.runs[row] != inputs.runs[rows.sequence[k - 1]]) first = row;
-      rows.instants(row) = inputs.instants(row) - inputs.instants(first);
-    }
-    return rows;
-  }
-  if (inputs.order.empty()) return rows;
-  rows.instants = inputs.values.col(order_column(inputs));
-  std::ranges::stable_sort(rows.sequence, {}, [&](Eigen::Index i) { return rows.instants(i); });
-  for (std::size_t k = 1; k < rows.sequence.size(); ++k) {
-    if (rows.instants(rows.sequence[k]) == rows.instants(rows.sequence[k - 1])) {
-      refuse("standard_terms",
-             fmt::format("the order \"{}\" has the value {} twice", inputs.order, rows.instants(rows.sequence[k])));
-    }
-  }
+  Rows rows = Recording(inputs).rows();
+  rows.simulated = simulated;
   return rows;
 }
 

@@ -1,0 +1,302 @@
+#include "discovery/answer/contests.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "discovery/answer/findings.hpp"
+#include "discovery/answer/judges.hpp"
+#include "discovery/answer/question.hpp"
+#include "discovery/recording/row_split.hpp"
+#include "discovery/recording/samples.hpp"
+
+namespace llmt::discovery {
+
+CrossValidation::CrossValidation(const Simulation& simulation, const Recording& recording,
+                                 const MeasuredOutputs& measured, const std::vector<ModelTerm>& terms,
+                                 const SearchedRows& rows, const MissingOptions& options)
+    : simulation_(&simulation),
+      recording_(&recording),
+      terms_(&terms),
+      outputs_(measured.names),
+      columns_(rows.columns) {
+  const RowSplit split = split_of_all(recording, rows, options);
+  data_ = {.samples = split.searched,
+           .measured = means_of_filtered(measured.values, split.searched),
+           .sigma = Eigen::VectorXd::Ones(measured.values.cols()),
+           .stretches = {}};
+}
+
+Eigen::MatrixXd CrossValidation::errors(const Missing& answer, const Eigen::MatrixXd& weights) const {
+  constexpr Eigen::Index folds = 5;
+  constexpr Eigen::Index stretches = 2 * folds;
+  Simulation simulation = *simulation_;
+  simulation.parameters = answer.parameters;
+  TermModel model(simulation, *recording_, outputs_, *terms_);
+  model.share(columns_, 0);
+  const Eigen::VectorXd start = values_of(answer.parameters);
+  const std::vector<PlacedTerm> placed = placed_terms(answer);
+  TermData data = data_;
+  if (weights.size() > 0) data.weights = std::make_shared<const Eigen::MatrixXd>(weights);
+  for (std::size_t o = 0; o < answer.gaps.size(); ++o) {
+    if (answer.gaps[o].noise_floor > 0.0) data.sigma(static_cast<Eigen::Index>(o)) = answer.gaps[o].noise_floor;
+  }
+  const Eigen::Index n = data.samples.size();
+  Eigen::MatrixXd errors(n, data.measured.cols());
+  for (Eigen::Index fold = 0; fold < folds; ++fold) {
+    std::vector<std::size_t> left_out;
+    std::vector<std::size_t> used;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      (i * stretches / n % folds == fold ? left_out : used).push_back(static_cast<std::size_t>(i));
+    }
+    if (left_out.empty()) continue;
+    const TermData fitted = without_samples(data, left_out);
+    std::vector<PlacedTerm> own = placed;
+    hold(model, fitted, start, own);
+    const TermFit fit = fit_terms(model, fitted, start, own);
+    const TermData unused = without_samples(data, used);
+    const Eigen::VectorXd stacked = scaled_residuals(model, unused, fit.parameters, fit.placed);
+    const Eigen::Index d = data.measured.cols();
+    for (std::size_t k = 0; k < left_out.size(); ++k) {
+      errors.row(static_cast<Eigen::Index>(left_out[k])) =
+          stacked.segment(static_cast<Eigen::Index>(k) * d, d).cwiseProduct(data.sigma).transpose();
+    }
+  }
+  return errors;
+}
+
+double log_likelihood_ratio(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
+                            double independent_share) {
+  double ratio = 0.0;
+  for (Eigen::Index o = 0; o < found.cols(); ++o) {
+    const Eigen::ArrayXd own = found.col(o).cwiseAbs();
+    const Eigen::ArrayXd others = other.col(o).cwiseAbs();
+    const Eigen::ArrayXd counts = (own.min(others) <= far_off * floors(o)).cast<double>();
+    const double smallest = std::numeric_limits<double>::min();
+    const double left = (counts * own.square()).sum() + smallest;
+    const double left_by_other = (counts * others.square()).sum() + smallest;
+    ratio += 0.5 * independent_share * counts.sum() * std::log(left / left_by_other);
+  }
+  return ratio;
+}
+
+namespace {
+
+using Terms = std::vector<ModelTerm>;
+using Left = std::set<std::size_t>;
+
+bool is_certain(const Missing& missing) {
+  return !missing.found.empty() && std::ranges::all_of(missing.found, &FoundTerm::confirmed);
+}
+
+bool has_shapes(const Missing& missing) { return std::ranges::any_of(missing.found, &FoundTerm::generic); }
+
+Eigen::Index fitted_numbers(const Missing& missing) {
+  Eigen::Index count = 0;
+  for (const FoundTerm& term : missing.found) {
+    count += (term.whole ? 0 : term.coefficients.size()) + term.constants.size();
+  }
+  return count;
+}
+
+bool has_same_terms(const Missing& a, const Missing& b) {
+  const auto terms = [](const Missing& missing) {
+    std::set<std::pair<std::size_t, Eigen::Index>> all;
+    for (const FoundTerm& found : missing.found) all.insert({found.term, found.output_index});
+    return all;
+  };
+  return terms(a) == terms(b);
+}
+
+// Whether what the answers add is within a tenth the same at all rows.
+bool is_same_function(const Missing& a, const Missing& b) {
+  for (Eigen::Index o = 0; o < a.corrected.cols(); ++o) {
+    const double size = (a.corrected.col(o) - a.before.col(o)).norm();
+    if ((a.corrected.col(o) - b.corrected.col(o)).norm() > same_function * size) return false;
+  }
+  return true;
+}
+
+// Those terms of `other` that are not among those of `found`, on the output of `term`.
+RivalTerms in_its_place(const FoundTerm& term, const std::vector<FoundTerm>& found, const Missing& other) {
+  RivalTerms rival;
+  for (const FoundTerm& instead : other.found) {
+    const bool is_shared = std::ranges::any_of(found, [&](const FoundTerm& own) {
+      return own.term == instead.term && own.output_index == instead.output_index;
+    });
+    if (is_shared || instead.output_index != term.output_index) continue;
+    rival.what +=
+        (rival.what.empty() ? "" : " + ") + instead.family + (instead.location.empty() ? "" : " " + instead.location);
+    rival.inputs.insert(rival.inputs.end(), instead.inputs.begin(), instead.inputs.end());
+  }
+  return rival;
+}
+
+// `other` as a rival of the terms of `found` that it does without.
+Missing with_rival(Missing found, const Missing& other, std::optional<Reason> objection) {
+  const std::vector<FoundTerm> all = found.found;
+  for (std::size_t k = 0; k < found.found.size(); ++k) {
+    FoundTerm& term = found.found[k];
+    const bool is_shared = std::ranges::any_of(other.found, [&](const FoundTerm& own) {
+      return own.term == term.term && own.output_index == term.output_index;
+    });
+    if (is_shared) continue;
+    const RivalTerms rival = in_its_place(term, all, other);
+    if (rival.what.empty()) continue;
+    term.rivals.insert(term.rivals.begin(), rival);
+    if (objection) object(found, *objection, {k});
+  }
+  decide(found);
+  return found;
+}
+
+template <class Test>
+Left with(Left left, const Terms& terms, Test test) {
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (test(terms[t])) left.insert(t);
+  }
+  return left;
+}
+
+// What a contest searches, but for the terms left out.
+struct Others {
+  Terms terms;
+  Left left_out;
+};
+
+// Nothing where the contest does not apply.
+using OthersOf = std::optional<Others> (*)(const Missing&, const Terms&, const Left& refuted);
+
+std::optional<Others> states(const Missing& found, const Terms& terms, const Left& refuted) {
+  if (found.answer != Answer::inner_state) return std::nullopt;
+  return Others{terms, with(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); })};
+}
+
+std::optional<Others> constants(const Missing& found, const Terms& terms, const Left& refuted) {
+  std::set<std::vector<std::string>> places;
+  for (const FoundTerm& term : found.found) {
+    if (!term.generic && term.constants.size() > 0 && term.inputs.size() == 1) places.insert(term.inputs);
+  }
+  if (places.empty() || found.answer == Answer::inner_state) return std::nullopt;
+  return Others{terms, with(refuted, terms, [&](const ModelTerm& term) {
+                  return places.contains(term.inputs) && !term.constants.empty();
+                })};
+}
+
+Left without(const Left& left, const Left& others) {
+  Left rest;
+  std::ranges::set_difference(left, others, std::inserter(rest, rest.end()));
+  return rest;
+}
+
+// "dx where x > c" is that of "dx".
+bool is_part_of(const ModelTerm& in_regime, const FoundTerm& found) {
+  return in_regime.family == found.family &&
+         in_regime.location.substr(0, in_regime.location.find("where ")) == found.location + " ";
+}
+
+// Terms without constants find the input and the threshold, and those that were found everywhere.
+std::optional<Others> plain_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
+  const Left regimes = terms_of_regimes(terms);
+  // Several terms may imitate one that acts in a part.
+  if (regimes.empty() || !(leaves_something(found) || found.found.size() > 1)) return std::nullopt;
+  return Others{terms, with(without(refuted, regimes), terms, [&](const ModelTerm& term) {
+                  return !term.regime.empty() && term.constants.size() > 1 &&
+                         std::ranges::none_of(found.found, [&](const FoundTerm& own) { return is_part_of(term, own); });
+                })};
+}
+
+// "where x > c".
+std::string gate_of(const std::string& location) { return location.substr(location.find("where ")); }
+
+// All terms, beyond the thresholds that were found.
+std::optional<Others> same_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
+  std::map<std::string, std::set<double>> thresholds;
+  for (const FoundTerm& term : found.found) {
+    if (term.regime.empty()) continue;
+    thresholds[gate_of(term.location)].insert(term.constants(term.constants.size() - 1));
+  }
+  if (thresholds.empty()) return std::nullopt;
+  Others others{terms, without(refuted, terms_of_regimes(terms))};
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (terms[t].regime.empty()) continue;
+    const auto own = thresholds.find(gate_of(terms[t].location));
+    if (own == thresholds.end()) {
+      others.left_out.insert(t);
+    } else {
+      others.terms[t].constants.back().tried.assign(own->second.begin(), own->second.end());
+    }
+  }
+  return others;
+}
+
+struct Contest {
+  const char* name;
+  OthersOf others;
+};
+
+// Regimes last, because they are tried where everything else leaves something.
+constexpr std::array<Contest, 4> contests = {{{"no states", states},
+                                              {"no searched constants", constants},
+                                              {"regimes", plain_regimes},
+                                              {"terms of these regimes", same_regimes}}};
+
+}  // namespace
+
+std::set<std::size_t> terms_of_regimes(const Terms& terms) {
+  return with({}, terms, [](const ModelTerm& term) { return !term.regime.empty(); });
+}
+
+bool leaves_something(const Missing& missing) {
+  constexpr double as_noise = 1.2;
+  const auto is_noise = [&](const Gap& gap) { return gap.after <= as_noise * gap.known_noise; };
+  if (missing.answer == Answer::inner_state || std::ranges::all_of(missing.gaps, is_noise)) return false;
+  if (missing.time.in_time && missing.time.independent_share < alike_in_neighbours) return true;
+  return missing.answer == Answer::unknown || missing.answer == Answer::undecided ||
+         missing.answer == Answer::failed_held_out || !missing.structure.empty();
+}
+
+Missing better_of(Missing found, Missing other, double ratio) {
+  const bool may_replace = is_certain(other) || !is_certain(found);
+  if (ratio < -likelihood_margin) return found;
+  if (ratio > likelihood_margin) {
+    return may_replace ? other : with_rival(std::move(found), other, Reason::likelier);
+  }
+  const std::optional<Reason> objection =
+      is_same_function(found, other) ? std::nullopt : std::optional<Reason>(Reason::rival);
+  const bool is_simpler = fitted_numbers(other) < fitted_numbers(found);
+  return is_simpler && may_replace ? with_rival(std::move(other), found, objection)
+                                   : with_rival(std::move(found), other, objection);
+}
+
+Missing contested(Missing found, const Terms& terms, const Left& refuted, const CrossValidation& validation,
+                  const std::function<Missing(const Terms&, const Left&)>& search) {
+  for (const Contest& contest : contests) {
+    const std::optional<Others> others = contest.others(found, terms, refuted);
+    if (!others) continue;
+    Missing other = search(others->terms, others->left_out);
+    const bool competes = other.answer != Answer::failed_held_out && !other.found.empty() &&
+                          beyond_constants(other, terms).empty() && !(has_shapes(other) && !has_shapes(found)) &&
+                          !has_same_terms(found, other);
+    if (!competes) continue;
+    Eigen::VectorXd floors(std::ssize(found.gaps));
+    for (std::size_t o = 0; o < found.gaps.size(); ++o) {
+      floors(static_cast<Eigen::Index>(o)) = std::max(found.gaps[o].noise_floor, other.gaps[o].noise_floor);
+    }
+    const double share = std::max(found.time.independent_share, other.time.independent_share);
+    // What is uncertain by one of the two answers counts as uncertain.
+    const Eigen::MatrixXd weights = found.weights.cwiseMin(other.weights);
+    const double ratio =
+        log_likelihood_ratio(validation.errors(found, weights), validation.errors(other, weights), floors, share);
+    found = better_of(std::move(found), std::move(other), ratio);
+  }
+  return found;
+}
+
+}  // namespace llmt::discovery
