@@ -16,6 +16,8 @@ bool has_effect(const Robot& robot, const auto& is_meant) {
   return std::ranges::any_of(robot.effects, [&](const Effect& own) { return is_meant(own); });
 }
 
+bool changes_payload(const EffectType& type) { return type.adjust && type.parameters.front().unit == "kg"; }
+
 std::optional<std::string> payload_to_state(const Robots& robots, const PoseSplit& split, const Findings& found,
                                             const DiscoveryOptions& options) {
   constexpr double material = 0.05;
@@ -23,12 +25,13 @@ std::optional<std::string> payload_to_state(const Robots& robots, const PoseSpli
   const Robot& improved = robots.improved.robot;
   const bool is_stated = improved.chain.payload.mass_kg > 0.0 || split.samples.poses.covariates.contains("payload_kg");
   const auto bends = [](const Effect& own) { return effect_type(own.type).scales_with_mass; };
-  const auto is_payload = [](const Effect& own) { return own.type == "payload_error"; };
+  const auto is_payload = [](const Effect& own) { return changes_payload(effect_type(own.type)); };
   if (is_stated || split.test.count() < 3 || !has_effect(improved, bends) || has_effect(improved, is_payload))
     return {};
   Robot loaded = improved;
   loaded.chain.payload.mass_kg = start_kg;  // the effect changes a payload that is there
-  loaded.effects.push_back({"payload_error", "", {0.0, 0.0, 0.0, 0.0}});
+  const EffectType& payload = *std::ranges::find_if(effect_types(), changes_payload);
+  loaded.effects.push_back({payload.name, "", std::vector<double>(payload.parameters.size(), 0.0)});
   const Measurements kept = without_rows(split.samples, found.investigation.verdict.outliers);
   const Calibration fitted = calibrate(loaded, kept, options.calibration);
   const Eigen::VectorXd without = distances(positions(robots.improved, split.test.poses), split.test);
@@ -49,7 +52,7 @@ std::vector<std::string> could_state(const Robots& robots, const PoseSplit& spli
                                      const DiscoveryOptions& options) {
   std::vector<std::string> sentences;
   if (const auto payload = payload_to_state(robots, split, found, options)) sentences.push_back(*payload);
-  const auto has_no_masses = [](const Effect& own) { return own.type == "joint_compliance_free_masses"; };
+  const auto has_no_masses = [](const Effect& own) { return effect_type(own.type).parameters.front().each_body; };
   if (has_effect(robots.improved.robot, has_no_masses)) {
     sentences.emplace_back(
         "State the masses of the links and their centres (mass_kg, com_mm): a compliance then has a value, and holds "

@@ -97,9 +97,10 @@ void validate(const Chain& chain) {
   for (const Joint& joint : chain.joints) {
     if (joint.name.empty()) refuse("name", "a joint has no name");
     if (joint.name.find('.') != std::string::npos)
-      refuse("name", fmt::format("joint name \"{}\" has a dot, which stands between a joint and its parameters (joint2.a): "
-                                 "write _ in its place, in the description and in the tables",
-                                 joint.name));
+      refuse("name",
+             fmt::format("joint name \"{}\" has a dot, which stands between a joint and its parameters (joint2.a): "
+                         "write _ in its place, in the description and in the tables",
+                         joint.name));
     if (!names.insert(joint.name).second) refuse("name", fmt::format("joint name \"{}\" is taken", joint.name));
     validate_joint(joint);
     if (joint.mimic) validate_mimic(chain, joint);

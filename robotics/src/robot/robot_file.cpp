@@ -262,8 +262,7 @@ Robot read_robot(const std::string& path, const UrdfLinks& links) {
     return robot;
   }
   if (!links.base.empty() || !links.tip.empty()) {
-    throw std::invalid_argument(
-        fmt::format("llmt::robotics::read_robot: links are given, and {} is no URDF", path));
+    throw std::invalid_argument(fmt::format("llmt::robotics::read_robot: links are given, and {} is no URDF", path));
   }
   return parse_robot(read_file(path, description_limit), path);
 }
