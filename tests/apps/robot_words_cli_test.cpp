@@ -50,7 +50,7 @@ TEST(RobotWords, DecimalCommasAreReadWhereAsked) {
         folder.run("cp " + sample_measured + " p.csv; " + command_line + "p.csv --json | grep -v p.csv");
     const Outcome with_commas = folder.run(command_line + "d.csv --decimal-comma --json | grep -v d.csv");
     EXPECT_EQ(with_commas.exit_code, 0) << with_commas.err;
-    EXPECT_EQ(with_commas.out, with_points.out);
+    EXPECT_EQ(program::without_record(with_commas.out), program::without_record(with_points.out));
   }
 }
 
