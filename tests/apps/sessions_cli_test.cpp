@@ -46,6 +46,16 @@ void simulate(const Folder& folder, const std::string& description, int poses, i
   ASSERT_EQ(run.exit_code, 0) << run.err;
 }
 
+// Both arms measured, and calibrated as one file of two sessions: two.yaml.
+void calibrate_two_days(const Folder& folder) {
+  write_arms(folder);
+  simulate(folder, "real.yaml", 60, 1, "a.csv");
+  simulate(folder, "moved.yaml", 60, 2, "b.csv");
+  folder.write("two.csv", with_sessions(llmt::read_file(folder.file("a.csv")), llmt::read_file(folder.file("b.csv"))));
+  ASSERT_EQ(folder.run(fmt::format("{} calibrate {}arm.yaml two.csv -o two.yaml", robot_program, samples)).exit_code,
+            0);
+}
+
 std::vector<std::vector<std::string>> cells_of(const std::string& csv) {
   std::vector<std::vector<std::string>> rows;
   std::istringstream lines(csv);
@@ -59,15 +69,10 @@ std::vector<std::vector<std::string>> cells_of(const std::string& csv) {
 
 TEST(SessionsProgram, PredictPutsEveryRowIntoTheFrameOfItsSession) {
   const Folder folder;
-  write_arms(folder);
-  simulate(folder, "real.yaml", 60, 1, "a.csv");
-  simulate(folder, "moved.yaml", 60, 2, "b.csv");
+  calibrate_two_days(folder);
   simulate(folder, "real.yaml", 3, 5, "c.csv");
   simulate(folder, "moved.yaml", 3, 6, "d.csv");
-  folder.write("two.csv", with_sessions(llmt::read_file(folder.file("a.csv")), llmt::read_file(folder.file("b.csv"))));
   folder.write("new.csv", with_sessions(llmt::read_file(folder.file("c.csv")), llmt::read_file(folder.file("d.csv"))));
-  ASSERT_EQ(folder.run(fmt::format("{} calibrate {}arm.yaml two.csv -o two.yaml", robot_program, samples)).exit_code,
-            0);
   const Outcome run = folder.run(robot_program + " predict two.yaml new.csv");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const auto rows = cells_of(run.out);
@@ -146,12 +151,7 @@ TEST(SessionsProgram, CompensateSummaryHasLinesAndTheFramesOfTheNominalArm) {
 
 TEST(SessionsProgram, ExportTakesTheFramesOfASessionOrRefuses) {
   const Folder folder;
-  write_arms(folder);
-  simulate(folder, "real.yaml", 60, 1, "a.csv");
-  simulate(folder, "moved.yaml", 60, 2, "b.csv");
-  folder.write("two.csv", with_sessions(llmt::read_file(folder.file("a.csv")), llmt::read_file(folder.file("b.csv"))));
-  ASSERT_EQ(folder.run(fmt::format("{} calibrate {}arm.yaml two.csv -o two.yaml", robot_program, samples)).exit_code,
-            0);
+  calibrate_two_days(folder);
   const Outcome tuesday = folder.run(robot_program + " export two.yaml --c --session tuesday -o t.c");
   EXPECT_EQ(tuesday.exit_code, 0) << tuesday.err;
   EXPECT_NE(tuesday.out.find("positions of the tool, in the frame of the instrument in the session tuesday"),
