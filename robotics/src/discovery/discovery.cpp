@@ -289,7 +289,7 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
     objections.push_back(*arm);
     add(arm->notes, notes);
   }
-  const std::optional<Objection> loss = judge_held_out_loss(gain, refits.gain, found.names.size());
+  const std::optional<Objection> loss = judge_held_out_loss(gain, found.names.size());
   const bool is_withdrawn = robots.is_worse || loss;
   if (loss) {
     objections.push_back(*loss);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <utility>
 
 #include "discovery/investigation/pose_split.hpp"
 #include "llmt/folds.hpp"
@@ -63,22 +62,12 @@ Refits refits_of(const Robots& robots, const PoseSplit& split, const Findings& f
   const std::vector<Eigen::Index> repeats = repeats_of(kept.poses);
   const std::vector<double> labels(repeats.begin(), repeats.end());
   refits.names.resize(found.names.size());
-  std::vector<double> without;
-  std::vector<double> with;
   for (const Fold& fold : make_folds(kept.count(), {.count = folds, .seed = options.seed}, labels)) {
     const Measurements fitted_to = without_rows(kept, rows_without(kept.count(), fold.train));
     const Calibration now = calibrate(robots.improved.robot, fitted_to, options.calibration);
-    const Measurements unseen = select(kept, fold.held_out);
-    const Robot plain = calibrate(robots.before, fitted_to, options.calibration).robot;
-    for (const auto& [robot, errors] : {std::pair(&plain, &without), std::pair(&now.robot, &with)}) {
-      const Eigen::VectorXd own = distances(positions(*robot, unseen.poses), unseen);
-      errors->insert(errors->end(), own.begin(), own.end());
-    }
     for (std::size_t k = 0; k < found.names.size(); ++k) add(found.names[k], now, refits.names[k]);
     ++refits.count;
   }
-  refits.gain = paired_difference(Eigen::Map<const Eigen::VectorXd>(without.data(), std::ssize(without)),
-                                  Eigen::Map<const Eigen::VectorXd>(with.data(), std::ssize(with)));
   return refits;
 }
 

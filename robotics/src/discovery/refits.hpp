@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "discovery/verification.hpp"
-#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 
@@ -19,8 +18,6 @@ struct NameInRefits {
 struct Refits {
   int count = 0;                    ///< 0: nothing was fitted again
   std::vector<NameInRefits> names;  ///< as Findings::names
-  /// Error without what was found minus error with it, of every sample by the refits that had not seen it, mm.
-  PairedDifference gain = {};
 };
 
 /// Five refits of the robot with what was found, each without a fifth of the samples (repeats of a pose together) and

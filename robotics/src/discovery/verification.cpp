@@ -84,10 +84,8 @@ std::optional<PairedDifference> held_out_gain(const Robots& robots, const PoseSp
                            distances(positions(robots.improved, common.poses), common));
 }
 
-std::optional<Objection> judge_held_out_loss(const std::optional<PairedDifference>& gain,
-                                             const PairedDifference& of_refits, std::size_t names) {
+std::optional<Objection> judge_held_out_loss(const std::optional<PairedDifference>& gain, std::size_t names) {
   if (!gain || gain->mean > 0.0) return std::nullopt;
-  if (names > 0 && gain->mean > -gain->standard_error && of_refits.is_beyond_chance()) return std::nullopt;
   Objection objection{Reason::held_out_loss};
   for (std::size_t k = 0; k < names; ++k) objection.names.push_back(k);
   objection.notes.push_back(

@@ -36,10 +36,8 @@ std::optional<PairedDifference> held_out_gain(const Robots& robots, const PoseSp
 
 /// Objection to all names if the mean of the gain is not above 0. A gain within two
 /// standard errors is no objection: the poses searched speak for the names, and those set aside do not speak against
-/// them. Nor is a loss within one standard error where refits of the names gain beyond chance on poses that they had
-/// not seen (`of_refits`): the poses set aside are then too few to speak.
-std::optional<Objection> judge_held_out_loss(const std::optional<PairedDifference>& gain,
-                                             const PairedDifference& of_refits, std::size_t names);
+/// them.
+std::optional<Objection> judge_held_out_loss(const std::optional<PairedDifference>& gain, std::size_t names);
 
 /// A sentence on poses set aside that are far off, such as lost beams, if there are any. They are not removed: no
 /// choice depends on them.

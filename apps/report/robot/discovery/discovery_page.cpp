@@ -115,7 +115,7 @@ std::vector<std::string> error_sentences(const Discovery& found) {
                     held.poses, held.before.mean, held.after.mean, held.before.p95, held.after.p95, held.before.max,
                     held.after.max));
   }
-  if (!found.withdrawn && held.gain.mean != 0.0 && !held.gain.is_beyond_chance()) {
+  if (held.gain.mean > 0.0 && !held.gain.is_beyond_chance()) {
     lines.push_back(
         fmt::format("On these poses the gain is within chance: {:.4f} mm, standard error {:.4f} mm. The names rest on "
                     "the poses searched.",
