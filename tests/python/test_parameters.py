@@ -1,5 +1,7 @@
 """Every parameter of an estimator does something, or is refused by its name, wherever estimators are taken."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,13 @@ def table(targets=1):
     return frame, pandas.Series(y, name="y") if targets == 1 else pandas.DataFrame(Y, columns=["y", "z"])
 
 
+@functools.cache
+def fitted_by_default(estimator, columns="", targets=1):
+    """Columns: letters of those that are inputs; all by default."""
+    X, y = table(targets)
+    return estimator().fit(X[list(columns)] if columns else X, y)
+
+
 def test_the_values_are_those_of_all_parameters():
     for values, estimator in ((TREE, LocalLinearTreeRegressor), (SUM, BoostedLocalLinearTreeRegressor)):
         defaults = estimator().get_params()
@@ -54,10 +63,11 @@ def test_the_values_are_those_of_all_parameters():
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", TREE)
 def test_a_parameter_of_a_tree_changes_the_fit(name):
-    X, y = table(2 if name == "shared_tree" else 1)
-    if name == "local_models":  # quadratic ones have at most 13 inputs
-        X = X[list("abcdef")]
-    by_default = LocalLinearTreeRegressor().fit(X, y)
+    targets = 2 if name == "shared_tree" else 1
+    columns = "abcdef" if name == "local_models" else ""  # quadratic ones have at most 13 inputs
+    X, y = table(targets)
+    X = X[list(columns)] if columns else X
+    by_default = fitted_by_default(LocalLinearTreeRegressor, columns, targets)
     changed = LocalLinearTreeRegressor(**{name: TREE[name]}).fit(X, y)
     if name == "teach":  # the taught tree is taken where it is better
         assert "teaching" in changed.summary_ and "teaching" not in by_default.summary_
@@ -69,7 +79,7 @@ def test_a_parameter_of_a_tree_changes_the_fit(name):
 @pytest.mark.parametrize("name", SUM)
 def test_a_parameter_of_a_sum_changes_the_fit(name):
     X, y = table()
-    by_default = BoostedLocalLinearTreeRegressor().fit(X, y).to_json()
+    by_default = fitted_by_default(BoostedLocalLinearTreeRegressor).to_json()
     changed = BoostedLocalLinearTreeRegressor(**{name: SUM[name]}).fit(X, y).to_json()
     assert (changed == by_default) == (name in WITHOUT_EFFECT)
 

@@ -208,6 +208,47 @@ TEST(Regimes, AnEffectBeyondAThresholdIsNamedWithIt) {
   }
 }
 
+// Rows at rest are set apart for the friction that they may have. Thresholds 0 and -band fit the others alike, and the
+// rows at rest say which it is. Friction at rest, of either sign, does not mislead.
+TEST(Regimes, WhetherAnEffectActsAtRestIsReadThere) {
+  constexpr Eigen::Index n = 600;
+  constexpr double band = 0.01;
+  for (const bool acts_at_rest : {false, true}) {
+    llmt::Random random(7);
+    Inputs inputs{{"q", "dq"}, Eigen::MatrixXd(n, 2)};
+    inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, 6.0);
+    Eigen::MatrixXd measured(n, 1);
+    SearchedRows rows{.apart = std::vector<bool>(n), .at_rest = Eigen::Vector2d(0.0, band)};
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const bool rests = i / 40 % 3 == 2;
+      const double speed = rests ? 0.0 : i / 40 % 3 == 0 ? 1.0 : -1.0;
+      inputs.values.row(i) << 2.0 * random.uniform() - 1.0, speed * (0.1 + random.uniform()) + 1e-4 * random.normal();
+      const bool acts = rests ? acts_at_rest : speed > 0.0;
+      const double friction = rests ? 0.3 * (2.0 * random.uniform() - 1.0) : 0.0;
+      measured(i, 0) = (acts ? 1.5 * inputs.values(i, 0) : 0.0) + friction + 0.01 * random.normal();
+      rows.apart[static_cast<std::size_t>(i)] = rests;
+    }
+    const std::vector<ModelTerm> terms = regime_terms(inputs, standard_terms(inputs));
+    const auto term = std::ranges::find_if(
+        terms, [](const ModelTerm& t) { return t.family == "linear" && t.location == "q where dq > c"; });
+    ASSERT_NE(term, terms.end());
+    Missing missing;
+    missing.answer = Answer::named;
+    missing.held_out = {0};
+    missing.gaps.resize(1);
+    missing.gaps[0].noise_floor = 0.05;
+    missing.parameters = tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"}).parameters;
+    FoundTerm found;
+    found.term = static_cast<std::size_t>(term - terms.begin());
+    found.constants = Eigen::VectorXd::Zero(1);
+    found.coefficients = Eigen::VectorXd::Constant(1, 1.4);
+    missing.found = {found};
+    fit_on_all_rows(tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"}), Recording(inputs), {{"y"}, measured, {}}, terms,
+                    rows, {}, missing);
+    EXPECT_EQ(missing.found[0].constants(0), acts_at_rest ? -band : 0.0);
+  }
+}
+
 // Beside a free mass, whose derivative is cos q, the term C cos q + S sin q says S, and the mass the rest.
 TEST(HeldCoefficients, WhatAParameterSaysIsLeftToIt) {
   const Model model;

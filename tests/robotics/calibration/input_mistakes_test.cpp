@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "calibration/orientation_mistake.hpp"
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/likely_mistake.hpp"
 #include "llmt/robotics/orientation.hpp"
@@ -63,7 +64,7 @@ TEST(LikelyMistake, TheOrderOfAnglesAndQuaternionsIsNamed) {
     Robot described = ur_like();
     described.chain.orientation = read;
     seen.orientation = to_orientation(rotations, written);
-    const std::optional<Suspicion> found = likely_mistake(described, with_orientations(seen, described.chain));
+    const auto found = likely_orientation_mistake(described, with_orientations(seen, described.chain));
     return found ? found->name : std::string();
   };
   const std::vector<std::string> orders = {"xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
@@ -75,12 +76,13 @@ TEST(LikelyMistake, TheOrderOfAnglesAndQuaternionsIsNamed) {
   }
   seen.orientation = to_orientation(rotations, "");
   const Eigen::MatrixXd first = seen.orientation.values;
-  EXPECT_FALSE(likely_mistake(ur_like(), with_orientations(seen, ur_like().chain)));
+  EXPECT_FALSE(likely_orientation_mistake(ur_like(), with_orientations(seen, ur_like().chain)));
   seen.orientation.values << first.rightCols(3), first.leftCols(1);
   EXPECT_EQ(likely_mistake(ur_like(), with_orientations(seen, ur_like().chain))->name, "orientation_w_last");
   for (Eigen::Matrix3d& own : rotations) own.transposeInPlace();
   seen.orientation = to_orientation(rotations, "");
-  EXPECT_EQ(likely_mistake(ur_like(), with_orientations(seen, ur_like().chain))->name, "orientation_inverse");
+  EXPECT_EQ(likely_orientation_mistake(ur_like(), with_orientations(seen, ur_like().chain))->name,
+            "orientation_inverse");
 }
 
 TEST(LikelyMistake, TheUnitOfOneTargetIsNamed) {

@@ -207,6 +207,29 @@ std::optional<RowSplit> without_outliers(const TermModel& model, const MeasuredO
   return with_samples(split, kept);
 }
 
+// Rows at which a speed rests are set apart, and they alone say whether an effect beyond 0 acts at rest: [x > 0] does
+// not, [x > -band] does, and at most rows that are fitted the two are one. The one with the smaller sum of squares at
+// rest is taken: (y - p)' (q - p) > (q - p)' (q - p) / 2, p and q what the two predict.
+void place_thresholds_at_rest(const TermModel& model, const MeasuredOutputs& measured, const Eigen::VectorXd& at_rest,
+                              TermFit& fit) {
+  for (PlacedTerm& placed : fit.placed) {
+    const ModelTerm& term = model.terms()[placed.term];
+    if (term.regime.empty() || at_rest.size() == 0) continue;
+    const double band = at_rest(std::ranges::find(model.inputs().names, term.regime) - model.inputs().names.begin());
+    double& threshold = placed.constants(placed.constants.size() - 1);
+    if (threshold != 0.0 || !(band > 0.0)) continue;
+    const auto predicted = [&](double place) -> Eigen::VectorXd {
+      threshold = place;
+      return model.recording().as_measured(model.predict(fit.parameters, fit.placed)).col(placed.output);
+    };
+    const Eigen::ArrayXd rests = (model.input(term.regime).array().abs() < band).cast<double>();
+    const Eigen::ArrayXd own = predicted(0.0);
+    const Eigen::ArrayXd change = rests * (predicted(-band).array() - own);
+    const double common = ((measured.values.col(placed.output).array() - own) * change).sum();
+    threshold = common > 0.5 * change.square().sum() ? -band : 0.0;
+  }
+}
+
 }  // namespace
 
 void fit_on_all_rows(const Simulation& simulation, const Recording& recording, const MeasuredOutputs& measured,
@@ -235,6 +258,7 @@ void fit_on_all_rows(const Simulation& simulation, const Recording& recording, c
   hold(model, data, start, placed);
   TermFit fit = fit_terms(model, data, start, placed);
   if (retry_constants(model, data, fit)) fit = fit_terms(model, data, fit.parameters, fit.placed);
+  place_thresholds_at_rest(model, measured, rows.at_rest, fit);
   const TermFit alone = fit_terms(model, data, start, {});
   set_trial_errors(model, data, fit);
   const bool is_certain = missing.answer == Answer::named || missing.answer == Answer::indistinguishable;

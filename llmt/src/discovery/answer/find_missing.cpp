@@ -164,6 +164,7 @@ Missing find(const Simulation& simulation, const Recording& as_given, const Meas
   const Recording& recording = smooth.recording;
   SearchedRows rows{.apart = std::vector<bool>(inputs_as_given.rows(), false)};
   if (recording.is_filtered()) rows.columns = std::make_shared<ColumnCache>(recording);
+  rows.at_rest = resting.inputs().zero_bands;
   mark(apart, rows.apart);
   for (const Eigen::Index row : smooth.unknown_sign) rows.apart[row] = true;
   std::set<std::size_t> refuted = terms_of_regimes(terms);

@@ -175,8 +175,9 @@ Eigen::VectorXd refined(Trials& trials, const std::vector<TermConstant>& constan
   return values;
 }
 
-// The best of the places between the neighbours of a threshold, which few were tried of.
-double refined_threshold(Trials& trials, const std::vector<double>& tried, double best, double gain) {
+// The best of the places between the neighbours of a threshold, which few were tried of. 0 costs no number: it stands
+// where another place gains less than a number of n rows costs, ln n of the mean square that is left.
+double refined_threshold(Trials& trials, const std::vector<double>& tried, double best, double gain, double n) {
   constexpr int places = 40;
   const auto above = std::ranges::upper_bound(tried, best);
   const auto below = std::ranges::lower_bound(tried, best);
@@ -189,7 +190,10 @@ double refined_threshold(Trials& trials, const std::vector<double>& tried, doubl
     gain = own;
     best = trial;
   }
-  return best;
+  if (!(tried.front() < 0.0 && 0.0 < tried.back())) return best;
+  const double at_zero = trials.gain(Eigen::VectorXd::Zero(1));
+  const double left = std::max(0.0, trials.sum_of_squares() - gain);
+  return gain - at_zero < left * std::log(n) / n ? 0.0 : best;
 }
 
 }  // namespace
@@ -253,7 +257,8 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
     if (constant.smooth && !ColumnCache::is_state_of_inputs(own)) {
       constants = refined(trials, own.constants, constants, gains[k]);
     } else if (!own.regime.empty() && own.constants.size() == 1 && constant.tried.size() > 1) {
-      constants(0) = refined_threshold(trials, constant.tried, constants(0), gains[k]);
+      constants(0) =
+          refined_threshold(trials, constant.tried, constants(0), gains[k], static_cast<double>(data.samples.size()));
     }
     best.push_back(trials.at(constants));
     best.back().explained = gains[k];
