@@ -14,6 +14,7 @@
 #include "llmt/bounds.hpp"
 #include "llmt/gaps.hpp"
 #include "llmt/partition.hpp"
+#include "llmt/training_record.hpp"
 
 namespace llmt {
 
@@ -21,9 +22,9 @@ namespace llmt {
 class BoostedModel {
  public:
   /// Throws std::invalid_argument naming the part that does not fit: another number of sums than outputs, an index out
-  /// of range, a tree that is none, a number that is not finite, two columns of one name.
+  /// of range, a tree that is none, a number that is not finite, two columns of one name, and as check_record().
   BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<double> deviations,
-               std::vector<BoostedSum> sums, std::vector<Gap> gaps = {});
+               std::vector<BoostedSum> sums, std::vector<Gap> gaps = {}, TrainingRecord record = {});
 
   Eigen::Index num_inputs() const { return std::ssize(inputs_); }
   Eigen::Index num_outputs() const { return std::ssize(outputs_); }
@@ -32,6 +33,7 @@ class BoostedModel {
   const std::vector<double>& deviations() const { return deviations_; }  ///< by which inputs are divided
   const std::vector<BoostedSum>& sums() const { return sums_; }          ///< one an output
   const std::vector<Gap>& gaps() const { return gaps_; }                 ///< of the training rows, for intervals
+  const TrainingRecord& record() const { return record_; }               ///< of the training rows; may be empty
 
   /// Predictions, rows x outputs, for `inputs` (rows x inputs; NaN: missing). Throws std::invalid_argument if the
   /// number of columns differs or a value is infinite. Same bytes at any number of threads (0: all), and for a row
@@ -61,6 +63,7 @@ class BoostedModel {
   std::vector<double> deviations_;
   std::vector<BoostedSum> sums_;
   std::vector<Gap> gaps_;
+  TrainingRecord record_;
 };
 
 /// Quantiles of each output, rows x probabilities; see quantiles_from(). Throws std::invalid_argument as

@@ -15,6 +15,7 @@
 #include "llmt/gaps.hpp"
 #include "llmt/model.hpp"
 #include "llmt/spread.hpp"
+#include "llmt/training_record.hpp"
 
 namespace llmt {
 
@@ -56,8 +57,9 @@ class Intervals {
 
   /// Models of the folds and the parts of their held-out rows. Throws std::invalid_argument if the numbers of inputs,
   /// outputs or levels of the models differ, a part names no model or has another number of outputs or spreads, a
-  /// residual is negative or not finite, or as check_spread() and check_gaps().
-  Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts, std::vector<Gap> gaps = {});
+  /// residual is negative or not finite, or as check_spread(), check_gaps() and check_record().
+  Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts, std::vector<Gap> gaps = {},
+            TrainingRecord record = {});
 
   /// One model and one matrix of absolute residuals (rows x outputs) for each fold, without spreads. `incomplete`: the
   /// same of the rows that lack an input; empty: there are none.
@@ -68,6 +70,7 @@ class Intervals {
   const std::vector<Model>& models() const { return models_; }
   const std::vector<HeldOutPart>& parts() const { return parts_; }  ///< in the order of their models
   const std::vector<Gap>& gaps() const { return gaps_; }            ///< of the training rows
+  const TrainingRecord& record() const { return record_; }          ///< of the training rows; may be empty
 
   /// Intervals that contain the fraction `level` (0.9, for example) of the outputs. Throws std::invalid_argument if
   /// there are no folds, the level is not between 0 and 1, or there are too few held-out rows of both kinds together
@@ -84,6 +87,7 @@ class Intervals {
   std::vector<Model> models_;
   std::vector<HeldOutPart> parts_;
   std::vector<Gap> gaps_;
+  TrainingRecord record_;
 };
 
 /// A model and the intervals that were made with it.

@@ -41,3 +41,4 @@
 #include "llmt/summary.hpp"
 #include "llmt/teach.hpp"
 #include "llmt/training_data.hpp"
+#include "llmt/training_record.hpp"

@@ -223,6 +223,18 @@ std::vector<Gap> gaps_of(const BoostingData& data) {
   return gaps;
 }
 
+// The record of the inputs that the sums use, where the caller has them.
+TrainingRecord record_of_rows(const BoostingData& data, const std::vector<bool>& used) {
+  TrainingRecord record;
+  record.inputs.resize(data.inputs.size());
+  const Eigen::MatrixXd x = with_empty_levels(data.inputs, data.x);
+  for (std::size_t j = 0; j < data.inputs.size(); ++j) {
+    if (!used[data.columns[j]]) continue;
+    record.inputs[data.columns[j]] = record_of(x.col(static_cast<Eigen::Index>(j)), data.inputs[j].levels.size());
+  }
+  return record;
+}
+
 // The model with its inputs where the caller has them.
 BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
   std::vector<InputColumn> inputs(data.inputs.size());
@@ -238,7 +250,9 @@ BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
     }
     for (SumResiduals& part : sum.held_out) part.spread = with_columns(part.spread, data.columns);
   }
-  return {std::move(inputs), data.outputs, std::move(deviations), std::move(sums), gaps_of(data)};
+  const BoostedModel model(inputs, data.outputs, deviations, sums);
+  return {std::move(inputs), data.outputs,  std::move(deviations),
+          std::move(sums),   gaps_of(data), record_of_rows(data, used_inputs(model))};
 }
 
 }  // namespace

@@ -259,6 +259,12 @@ KeptRows keep(const GivenRows& given, const FoldOptions& folds) {
   return kept;
 }
 
+std::vector<int> copies_of(const KeptRows& kept) {
+  std::vector<int> copies(static_cast<std::size_t>(kept.count()), 0);
+  for (const RowPlace& place : kept.places) ++copies[static_cast<std::size_t>(place.kept)];
+  return copies;
+}
+
 Eigen::Index learned_rows(const KeptRows& kept) {
   std::vector<bool> is_held_out(kept.count(), false);
   for (std::size_t f = 0; kept.is_fold_given && f < kept.folds.size(); ++f) {

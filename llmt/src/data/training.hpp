@@ -95,6 +95,9 @@ struct KeptRows {
 /// Throws std::invalid_argument as selection_folds().
 KeptRows keep(const GivenRows& given, const FoldOptions& folds);
 
+/// How often each kept row counts: it, and its copies.
+std::vector<int> copies_of(const KeptRows& kept);
+
 /// The number of given rows that the model is fitted to, copies included.
 Eigen::Index learned_rows(const KeptRows& kept);
 

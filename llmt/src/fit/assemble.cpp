@@ -70,7 +70,8 @@ PartitionSummary describe(const Partition& partition, const TrainingRows& rows, 
 }
 
 // Model and held-out residuals of every fold.
-Intervals make_intervals(const Training& training, std::vector<std::optional<FittedPartition>>& fitted) {
+Intervals make_intervals(const Training& training, std::vector<std::optional<FittedPartition>>& fitted,
+                         const Model& of_all) {
   std::vector<Model> models;
   std::vector<std::span<const int>> held_out;
   const Table& table = *training.table;
@@ -81,8 +82,10 @@ Intervals make_intervals(const Training& training, std::vector<std::optional<Fit
     models.push_back(make_model(rows.training, std::move(partitions)));
     held_out.emplace_back(rows.held_out.rows);
   }
-  return held_out_intervals(std::move(models), table.inputs, table.outputs, training.kept->precisions, held_out,
-                            training.options.max_threads);
+  return held_out_intervals(
+      std::move(models), of_all,
+      {table.inputs, table.outputs, training.kept->precisions, copies_of(*training.kept), std::move(held_out)},
+      training.options.max_threads);
 }
 
 }  // namespace
@@ -137,13 +140,14 @@ FitResult assemble(const Training& training, std::vector<std::optional<FittedPar
   FitSummary summary{.min_leaf_samples = plan_of(training).growth.min_leaf_samples,
                      .partitions = {},
                      .quadratic = !training.table->products.empty()};
-  Intervals intervals = make_intervals(training, fitted);
   std::vector<PartitionOn> partitions;
   for (auto& each : fitted) {
     summary.partitions.push_back(std::move(each->summary));
     partitions.push_back(std::move(each->of_all));
   }
-  return {make_model(training.all, std::move(partitions)), std::move(summary), std::move(intervals)};
+  Model model = make_model(training.all, std::move(partitions));
+  Intervals intervals = make_intervals(training, fitted, model);
+  return {std::move(model), std::move(summary), std::move(intervals)};
 }
 
 namespace {

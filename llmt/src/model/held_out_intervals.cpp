@@ -90,12 +90,45 @@ std::vector<Gap> gaps_of(const std::vector<Model>& models, const Eigen::Ref<cons
   return fit_gaps(inputs, columns);
 }
 
+// Rows and mean squares of the leaves of each output; `x`, `residuals`: of the held-out rows.
+std::vector<std::vector<LeafRecord>> record_of_leaves(const Model& model, const Eigen::MatrixXd& x,
+                                                      const Eigen::MatrixXd& residuals, int max_threads) {
+  std::vector<std::vector<LeafRecord>> leaves(static_cast<std::size_t>(residuals.cols()));
+  const Eigen::MatrixXi leaf_of = model.leaf_of(x, max_threads);
+  for (std::size_t p = 0; p < model.partitions().size(); ++p) {
+    const Partition& partition = model.partitions()[p];
+    for (const int output : partition.outputs) {
+      std::vector<LeafRecord>& of_output = leaves[static_cast<std::size_t>(output)];
+      of_output.resize(static_cast<std::size_t>(partition.num_leaves()));
+      for (Eigen::Index row = 0; row < x.rows(); ++row) {
+        LeafRecord& leaf = of_output[static_cast<std::size_t>(leaf_of(row, static_cast<Eigen::Index>(p)))];
+        ++leaf.rows;
+        leaf.mean_square += residuals(row, output) * residuals(row, output);
+      }
+      for (LeafRecord& leaf : of_output) leaf.mean_square /= static_cast<double>(std::max(leaf.rows, Eigen::Index{1}));
+    }
+  }
+  return leaves;
+}
+
+// Of the inputs that the model uses, from all rows.
+std::vector<InputRecord> record_of_inputs(const Model& model, const MeasuredRows& rows) {
+  const std::vector<bool> used = used_inputs(model);
+  const Eigen::MatrixXd x = with_empty_levels(model.inputs(), rows.inputs);
+  std::vector<InputRecord> inputs(used.size());
+  for (std::size_t j = 0; j < used.size(); ++j) {
+    if (!used[j]) continue;
+    inputs[j] = record_of(x.col(static_cast<Eigen::Index>(j)), model.inputs()[j].levels.size(), rows.copies);
+  }
+  return inputs;
+}
+
 }  // namespace
 
-Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                             const Eigen::Ref<const Eigen::MatrixXd>& outputs, const Eigen::VectorXd& precisions,
-                             const std::vector<std::span<const int>>& held_out, int max_threads) {
+Intervals held_out_intervals(std::vector<Model> models, const Model& of_all, const MeasuredRows& rows,
+                             int max_threads) {
   if (models.empty()) return {};
+  const auto& [inputs, outputs, precisions, copies, held_out] = rows;
   const bool is_one_fold = models.size() == 1;
   const DealtFolds folds = dealt(held_out);
   const std::vector<InputColumn>& columns = models.front().inputs();
@@ -129,7 +162,9 @@ Intervals held_out_intervals(std::vector<Model> models, const Eigen::Ref<const E
     }
   }
   std::vector<Gap> gaps = gaps_of(models, inputs);
-  return {std::move(models), std::move(parts), std::move(gaps)};
+  TrainingRecord record{.inputs = record_of_inputs(of_all, rows),
+                        .leaves = record_of_leaves(of_all, x, residuals, max_threads)};
+  return {std::move(models), std::move(parts), std::move(gaps), std::move(record)};
 }
 
 }  // namespace llmt

@@ -172,9 +172,11 @@ std::vector<HeldOutPart> parts_of(std::vector<Eigen::MatrixXd> residuals, std::v
 
 }  // namespace
 
-Intervals::Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts, std::vector<Gap> gaps)
-    : models_(std::move(models)), parts_(std::move(parts)), gaps_(std::move(gaps)) {
+Intervals::Intervals(std::vector<Model> models, std::vector<HeldOutPart> parts, std::vector<Gap> gaps,
+                     TrainingRecord record)
+    : models_(std::move(models)), parts_(std::move(parts)), gaps_(std::move(gaps)), record_(std::move(record)) {
   check_gaps(gaps_, models_.empty() ? 0 : models_.front().num_inputs());
+  if (!models_.empty()) check_record(record_, models_.front().inputs(), models_.front().outputs().size());
   for (std::size_t k = 0; k < models_.size(); ++k) {
     if (const std::string difference = difference_of_columns(models_[k], models_[0]); !difference.empty()) {
       refuse_intervals(fmt::format("fold {} and fold 0 differ: {}", k, difference));

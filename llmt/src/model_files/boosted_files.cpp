@@ -188,6 +188,7 @@ std::string to_json(const BoostedModel& model) {
     write_held_out(sum.held_out, json["sums"].back());
   }
   if (!model.gaps().empty()) json["gaps"] = json_of(model.gaps());
+  if (!model.record().empty()) json["training"] = json_of(model.record());
   return compact_text(json);
 }
 
@@ -210,11 +211,12 @@ BoostedModel boosted_from_json(const std::string& text, const std::string& name)
   for (const JsonReader& sum : root.member("sums").elements()) sums.push_back(sum_from(sum));
   std::vector<Gap> gaps = gaps_from(root);
   try {
-    return {std::move(inputs), std::move(outputs), std::move(deviations), std::move(sums), std::move(gaps)};
+    return {std::move(inputs), std::move(outputs), std::move(deviations),
+            std::move(sums),   std::move(gaps),    record_from(root)};
   } catch (const BoostedFault& fault) {
     root.fail_at(fault.pointer(), fault.problem());
   } catch (const std::invalid_argument& error) {
-    root.member("gaps").fail(error.what());
+    root.member(root.has("training") && !root.has("gaps") ? "training" : "gaps").fail(error.what());
   }
 }
 

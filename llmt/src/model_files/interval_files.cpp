@@ -54,7 +54,7 @@ Json json_of(const HeldOutPart& part) {
   return json;
 }
 
-Intervals intervals_from(const JsonReader& folds, std::vector<Gap> gaps, const Model& model) {
+Intervals intervals_from(const JsonReader& folds, std::vector<Gap> gaps, TrainingRecord record, const Model& model) {
   std::vector<Model> models;
   std::vector<HeldOutPart> parts;
   for (const JsonReader& fold : folds.elements()) {
@@ -67,7 +67,7 @@ Intervals intervals_from(const JsonReader& folds, std::vector<Gap> gaps, const M
     models.push_back(model_from(fold.member("model")));
   }
   try {
-    Intervals intervals(std::move(models), std::move(parts), std::move(gaps));
+    Intervals intervals(std::move(models), std::move(parts), std::move(gaps), std::move(record));
     check_belong(intervals.models(), model);
     return intervals;
   } catch (const std::invalid_argument& error) {
@@ -103,6 +103,7 @@ std::string to_json(const Model& model, const Intervals& intervals) {
     json["intervals"].push_back(std::move(fold));
   }
   if (!intervals.gaps().empty()) json["gaps"] = json_of(intervals.gaps());
+  if (!intervals.record().empty()) json["training"] = json_of(intervals.record());
   return model_text(json);
 }
 
@@ -112,7 +113,9 @@ ModelWithIntervals from_json_with_intervals(const std::string& text, const std::
   const JsonReader root(json, name);
   Model model = model_from(root);
   Intervals intervals;
-  if (root.has("intervals")) intervals = intervals_from(root.member("intervals"), gaps_from(root), model);
+  if (root.has("intervals")) {
+    intervals = intervals_from(root.member("intervals"), gaps_from(root), record_from(root), model);
+  }
   return {std::move(model), std::move(intervals)};
 }
 

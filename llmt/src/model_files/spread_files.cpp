@@ -30,6 +30,23 @@ Json json_of(const std::vector<Gap>& gaps) {
   return json;
 }
 
+Json json_of(const TrainingRecord& record) {
+  Json inputs = Json::array();
+  for (const InputRecord& input : record.inputs) {
+    Json& json = inputs.emplace_back(Json::object());
+    if (input.empty()) continue;
+    if (input.missing > 0) json["missing"] = input.missing;
+    if (!input.values.empty()) json["values"] = input.values;
+    json["counts"] = input.counts;
+  }
+  Json json = {{"inputs", std::move(inputs)}};
+  for (const std::vector<LeafRecord>& of_output : record.leaves) {
+    Json& leaves = json["leaves"].emplace_back(Json::array());
+    for (const LeafRecord& leaf : of_output) leaves.push_back({leaf.rows, leaf.mean_square});
+  }
+  return json;
+}
+
 std::vector<Gap> gaps_from(const JsonReader& model) {
   std::vector<Gap> gaps;
   if (!model.has("gaps")) return gaps;
@@ -42,6 +59,28 @@ std::vector<Gap> gaps_from(const JsonReader& model) {
     }
   }
   return gaps;
+}
+
+TrainingRecord record_from(const JsonReader& model) {
+  TrainingRecord record;
+  if (!model.has("training")) return record;
+  const JsonReader training = model.member("training");
+  for (const JsonReader& json : training.member("inputs").elements()) {
+    InputRecord& input = record.inputs.emplace_back();
+    input.missing = json.as<Eigen::Index>("missing", 0);
+    if (json.has("values")) input.values = json.member("values").list<double>();
+    if (json.has("counts")) input.counts = json.member("counts").list<Eigen::Index>();
+  }
+  if (!training.has("leaves")) return record;
+  for (const JsonReader& of_output : training.member("leaves").elements()) {
+    std::vector<LeafRecord>& leaves = record.leaves.emplace_back();
+    for (const JsonReader& leaf : of_output.elements()) {
+      const std::vector<JsonReader> parts = leaf.elements();
+      if (parts.size() != 2) leaf.fail("a leaf has 2 numbers: rows, and a mean square");
+      leaves.push_back({parts[0].as<Eigen::Index>(), parts[1].as<double>()});
+    }
+  }
+  return record;
 }
 
 Spread spread_from(const JsonReader& json) {

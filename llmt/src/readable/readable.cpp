@@ -224,7 +224,8 @@ ReadablePartition describe(const Model& model, std::size_t p, const Choice& choi
   return result;
 }
 
-Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr<ReadableTrees>>& parts, Work& work) {
+Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr<ReadableTrees>>& parts,
+                       const Model& of_all, Work& work) {
   std::vector<Model> models;
   std::vector<std::span<const int>> held_out;
   for (std::size_t f = 0; setting.training.options.intervals && f < setting.folds.size(); ++f) {
@@ -232,7 +233,9 @@ Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr
     held_out.emplace_back(setting.folds[f].held_out.rows);
   }
   const Table& table = *setting.training.table;
-  return held_out_intervals(std::move(models), table.inputs, table.outputs, setting.training.kept->precisions, held_out,
+  const KeptRows& kept = *setting.training.kept;
+  return held_out_intervals(std::move(models), of_all,
+                            {table.inputs, table.outputs, kept.precisions, copies_of(kept), std::move(held_out)},
                             setting.plan.max_threads);
 }
 
@@ -260,9 +263,9 @@ ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitte
     Work part(work, share / static_cast<double>(fitted.partitions.size()));
     parts.push_back(find_trees(setting, partition.outputs, best_crisp_of(partition), loss, part));
   }
-  ReadableResult result{.model = assemble(parts, folds.size(), options.max_threads, work),
-                        .partitions = {},
-                        .intervals = intervals_of(setting, parts, work)};
+  ReadableResult result{
+      .model = assemble(parts, folds.size(), options.max_threads, work), .partitions = {}, .intervals = {}};
+  result.intervals = intervals_of(setting, parts, result.model, work);
   for (std::size_t p = 0; p < parts.size(); ++p) {
     result.partitions.push_back(describe(result.model, p, parts[p]->choice));
   }

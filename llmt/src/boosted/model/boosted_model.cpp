@@ -154,14 +154,17 @@ double value_of(const BoostedTree& tree, const double* z) {
 }
 
 BoostedModel::BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
-                           std::vector<double> deviations, std::vector<BoostedSum> sums, std::vector<Gap> gaps)
+                           std::vector<double> deviations, std::vector<BoostedSum> sums, std::vector<Gap> gaps,
+                           TrainingRecord record)
     : inputs_(std::move(inputs)),
       outputs_(std::move(outputs)),
       deviations_(std::move(deviations)),
       sums_(std::move(sums)),
-      gaps_(std::move(gaps)) {
+      gaps_(std::move(gaps)),
+      record_(std::move(record)) {
   check_boosted(inputs_, outputs_, deviations_, sums_);
   check_gaps(gaps_, num_inputs());
+  check_record(record_, inputs_, outputs_.size());
 }
 
 BoostedSize size_of(const BoostedModel& model) {

@@ -188,7 +188,7 @@ std::vector<int> with_codes(std::vector<int> categorical, const Codes& codes) {
 Intervals with_codes(const Intervals& intervals, const Codes& codes, const std::vector<std::size_t>& empty_levels) {
   std::vector<Model> models;
   for (const Model& model : intervals.models()) models.push_back(with_codes(model, codes, empty_levels));
-  return {std::move(models), intervals.parts()};
+  return {std::move(models), intervals.parts(), intervals.gaps(), intervals.record()};
 }
 
 }  // namespace llmt
