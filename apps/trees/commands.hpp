@@ -13,6 +13,7 @@ void add_fit(CLI::App& app);
 void add_predict(CLI::App& app);
 void add_inspect(CLI::App& app);
 void add_explain(CLI::App& app);
+void add_check(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_discover(CLI::App& app);
 void add_signals(CLI::App& app);

@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   llmt::apps::add_predict(app);
   llmt::apps::add_inspect(app);
   llmt::apps::add_explain(app);
+  llmt::apps::add_check(app);
   llmt::apps::add_compare(app);
   llmt::apps::add_signals(app);
   llmt::apps::add_table(app);

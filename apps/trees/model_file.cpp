@@ -1,5 +1,7 @@
 #include "trees/model_file.hpp"
 
+#include <fmt/format.h>
+
 #include <exception>
 #include <filesystem>
 #include <fstream>
@@ -35,6 +37,16 @@ ModelWithIntervals load_model(const std::string& path, bool with_intervals) {
 }
 
 Model load_model(const std::string& path) { return load_model(path, false).model; }
+
+Eigen::VectorXd positive_weights(const Csv& csv, const std::string& column, int threads) {
+  Eigen::VectorXd weights = csv.numbers(column, threads);
+  for (Eigen::Index row = 0; row < weights.size(); ++row) {
+    if (!(weights(row) > 0.0)) {
+      csv.refuse(row, column, fmt::format("a weight is positive, this one is {}", weights(row)));
+    }
+  }
+  return weights;
+}
 
 bool is_boosted_file(const std::string& path) {
   std::error_code unknown;

@@ -87,24 +87,13 @@ void add_intervals(const PredictArguments& arguments, const ModelWithIntervals& 
   }
 }
 
-// The weights of the rows; empty: none are asked for.
-Eigen::VectorXd weights_of(const PredictArguments& arguments, const Csv& csv) {
-  if (arguments.weight.empty()) return {};
-  const Eigen::VectorXd weights = csv.numbers(arguments.weight, arguments.threads);
-  for (Eigen::Index row = 0; row < weights.size(); ++row) {
-    if (weights(row) > 0.0) continue;
-    throw std::runtime_error(fmt::format("{}:{}: column \"{}\": a weight is positive, this one is {}", csv.name(),
-                                         csv.line_of(row), arguments.weight, weights(row)));
-  }
-  return weights;
-}
-
 // What cannot be had is the file's fault, not the caller's: it has too few residuals for the level.
 template <class AnyModel>
 void add_asked_intervals(const PredictArguments& arguments, const AnyModel& model, const Csv& csv,
                          const Eigen::MatrixXd& inputs, report::Prediction& predicted) {
   if (!asks_for_intervals(arguments)) return;
-  const Eigen::VectorXd weights = weights_of(arguments, csv);
+  const Eigen::VectorXd weights =
+      arguments.weight.empty() ? Eigen::VectorXd() : positive_weights(csv, arguments.weight, arguments.threads);
   predicted.probabilities = arguments.quantiles;
   try {
     add_intervals(arguments, model, inputs, weights, predicted);

@@ -1,5 +1,6 @@
 // Sums of trees.
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
@@ -7,7 +8,9 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -15,6 +18,7 @@
 #include "llmt/boosted.hpp"
 #include "llmt/boosted_explain.hpp"
 #include "llmt/c_source.hpp"
+#include "python/bindings/checked.hpp"
 #include "python/bindings/interruptible.hpp"
 #include "python/bindings/model_arrays.hpp"
 #include "python/bindings/module.hpp"
@@ -147,6 +151,16 @@ void add_boosted(nb::module_& module) {
       .def("importance", &importance_in_sum, nb::arg("inputs"), nb::arg("threads") = 0)
       .def("partial_dependence", &partial_dependence_of, nb::arg("inputs"), nb::arg("input"), nb::arg("values"),
            nb::arg("threads") = 0)
+      .def(
+          "check",
+          [](const Self& self, const Array& inputs, const Array& outputs,
+             const std::vector<std::map<std::string, Eigen::Index>>& words, double level, std::vector<double> limits,
+             const std::optional<Vector>& weights, int threads) {
+            return check_rows(self, self.inputs(), nullptr,
+                              {inputs, outputs, words, check_options(level, std::move(limits), weights, threads)});
+          },
+          nb::arg("inputs"), nb::arg("outputs"), nb::arg("words"), nb::arg("level"), nb::arg("limits"),
+          nb::arg("weights").none(), nb::arg("threads") = 0)
       .def("to_c", &c_source_of_sum, nb::arg("name"))
       .def("text", [](const Self& self, const std::string& name, std::size_t width) {
         return report::boosted_inspection_text(self, name, width);

@@ -1,10 +1,13 @@
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <map>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -14,6 +17,7 @@
 #include "llmt/intervals.hpp"
 #include "llmt/model.hpp"
 #include "python/bindings/arrays.hpp"
+#include "python/bindings/checked.hpp"
 #include "python/bindings/model_arrays.hpp"
 #include "python/bindings/module.hpp"
 #include "report/model/leaves.hpp"
@@ -135,6 +139,16 @@ void add_models(nb::module_& module) {
       .def("quantiles", &quantiles_of, nb::arg("inputs"), nb::arg("probabilities"), nb::arg("threads") = 0)
       .def("attribute", &attribute_rows, nb::arg("inputs"))
       .def("importance", &importance_of, nb::arg("inputs"), nb::arg("threads") = 0)
+      .def(
+          "check",
+          [](const Self& self, const Array& inputs, const Array& outputs,
+             const std::vector<std::map<std::string, Eigen::Index>>& words, double level, std::vector<double> limits,
+             const std::optional<Vector>& weights, int threads) {
+            return check_rows(self, self.model.inputs(), &self.model,
+                              {inputs, outputs, words, check_options(level, std::move(limits), weights, threads)});
+          },
+          nb::arg("inputs"), nb::arg("outputs"), nb::arg("words"), nb::arg("level"), nb::arg("limits"),
+          nb::arg("weights").none(), nb::arg("threads") = 0)
       .def("to_c", &c_source, nb::arg("name"))
       .def("leaves_json", [](const Self& self) { return report::leaves_json(self.model).dump(); })
       .def("leaves_text", [](const Self& self, const std::string& name,

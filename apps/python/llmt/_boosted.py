@@ -204,9 +204,6 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
     def _importances(self) -> np.ndarray:
         return np.asarray(self._model().handle.importance(self._rows("feature_importances_", 500), self._threads()))
 
-    def _held_out_rmse(self) -> dict[str, float]:
-        return {of["target"]: of["held_out_rmse"] for of in self.summary_.get("sums", [])}
-
     def _rows(self, who: str, most: int) -> np.ndarray:
         """Rows of the fit, evenly spaced."""
         self._model()

@@ -233,7 +233,7 @@ class TableRegressor(RegressorMixin, BaseEstimator):
                 raise ValueError("groups deal folds, and eval_set takes their place: give one of them")
             values, judged = self._evaluation(eval_set, table, outputs)
             held_out = list(range(rows, rows + len(judged)))
-            table = Table(np.vstack([table.values, values]), table.names, table.levels, table.unknown)
+            table = Table(np.vstack([table.values, values]), table.names, table.levels, table.unknown_words)
             outputs = np.vstack([outputs, judged])
             weights = None if weights is None else np.concatenate([weights, np.ones(len(judged))])
         meant = {str(name) for name in self.categorical_features}

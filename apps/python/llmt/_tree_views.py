@@ -160,14 +160,6 @@ class TreeViews(Views):
 
         return tree_html(json.loads(self.model_.to_json()), self.summary_ or None, mean=self._mean, readable=self._is_readable)
 
-    def _held_out_rmse(self) -> dict[str, float]:
-        """The targets that have a tree of their own and held-out rows."""
-        return {
-            partition["targets"][0]: partition["cv_rmse"]
-            for partition in self.summary_.get("partitions", [])
-            if len(partition["targets"]) == 1 and partition["cv_rmse"] is not None
-        }
-
     def _summary(self, who: str) -> dict[str, Any]:
         self._model()
         if "partitions" not in self.summary_:

@@ -31,12 +31,33 @@ class Views:
         contribution, summing to 1; the mean over the targets."""
         return np.asarray(self._importances().mean(axis=0))
 
-    def check(self, X: Any, y: Any = None) -> "Check":
-        """What is wrong with new rows: outside the training ranges, unknown categories, missing cells, shifted columns;
-        with `y` also the error beside that on held-out rows."""
+    def check(
+        self,
+        X: Any,
+        y: Any = None,
+        *,
+        max_error: "float | list[float] | None" = None,
+        level: float = 0.05,
+        sample_weight: Any = None,
+    ) -> "Check":
+        """Whether the model is still good on new rows, and what of them changed, as `llmt check` says it: the error beside
+        what held-out rows of the fit promise, intervals, leaves that got worse, inputs that are not as in training,
+        unknown categories by name. Without `y` the verdict is "not evaluated", and the inputs are judged all the same.
+
+        Parameters
+        ----------
+        X, y
+            New rows and their targets.
+        max_error : float or list of float, optional
+            RMSE up to which the model is good, one a target; None: a tenth above the promised one, unless within chance.
+        level : float
+            Probability that something is said to have changed although nothing has.
+        sample_weight : array-like, optional
+            Weights of the rows, of a model that was fitted with weights.
+        """
         from ._check import check
 
-        return check(self, X, y)
+        return check(self, X, y, max_error, level, sample_weight)
 
     def summary(self, width: int = 100) -> str:
         """What was fitted, compared and chosen, as `llmt fit` prints it."""

@@ -264,6 +264,7 @@ ModelInputs read_inputs(const Csv& csv, const std::vector<InputColumn>& model_in
   }
   auto [values, cells] = csv.read_numbers(columns, max_threads);
   ModelInputs inputs{std::move(values)};
+  inputs.unknown_words.resize(model_inputs.size());
   std::vector<Eigen::Index> bad;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const InputColumn& input = model_inputs[input_of[i]];
@@ -289,6 +290,9 @@ ModelInputs read_inputs(const Csv& csv, const std::vector<InputColumn>& model_in
     } else {
       value = no_level;
       ++inputs.unknown;
+      UnknownWords& words = inputs.unknown_words[static_cast<std::size_t>(input_of[column_of[i]])];
+      const auto known = words.find(text);
+      ++(known != words.end() ? known : words.emplace(text, 0).first)->second;
     }
   });
   if (std::ssize(columns) < std::ssize(model_inputs)) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -78,13 +79,17 @@ void refuse_negative_weight(const Csv& csv, const std::string& column, const Eig
 LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, const ColumnAdvice& advice,
                                       double largest_input, int max_threads);
 
+/// Words of a category that training had not, and in how many rows each stands.
+using UnknownWords = std::map<std::string, Eigen::Index, std::less<>>;
+
 /// Inputs of a model. A column of the table that is not there is missing in every row if the model does not use it, and
 /// an error otherwise.
 struct ModelInputs {
-  Eigen::MatrixXd values;         ///< as Model::predict() takes them
-  Eigen::Index missing = 0;       ///< cells without a value
-  Eigen::Index unknown = 0;       ///< cells with a category that training had not
-  Eigen::Index unseen_codes = 0;  ///< cells with a number that is none of InputColumn::codes
+  Eigen::MatrixXd values;                        ///< as Model::predict() takes them
+  Eigen::Index missing = 0;                      ///< cells without a value
+  Eigen::Index unknown = 0;                      ///< cells with a category that training had not
+  Eigen::Index unseen_codes = 0;                 ///< cells with a number that is none of InputColumn::codes
+  std::vector<UnknownWords> unknown_words = {};  ///< one an input of the model; empty for numbers and codes
 };
 ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads);
 ModelInputs read_inputs(const Csv& csv, const BoostedModel& model, int max_threads);

@@ -11,6 +11,7 @@
 #include "llmt/boosted_model.hpp"
 #include "llmt/bounds.hpp"
 #include "llmt/c_source.hpp"
+#include "llmt/check.hpp"
 #include "llmt/compare.hpp"
 #include "llmt/crps.hpp"
 #include "llmt/csv.hpp"

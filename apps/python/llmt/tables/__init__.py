@@ -34,7 +34,13 @@ class Table:
     values: np.ndarray  # (rows, columns) float64; NaN: missing; a category is its position in its column's levels
     names: list[str] | None  # None: columns without names
     levels: list[list[str]]  # of each column; []: numbers
-    unknown: list[int]  # of each column: cells with a category that is not among the given levels; they are UNKNOWN
+    # Of each column: the words that are not among the given levels, and how many cells have each; these are UNKNOWN.
+    unknown_words: list[dict[str, int]]
+
+    @property
+    def unknown(self) -> list[int]:
+        """Of each column: cells with a category that is not among the given levels."""
+        return [sum(words.values()) for words in self.unknown_words]
 
 
 def read_table(
@@ -87,13 +93,11 @@ def read_table(
             )
     refuse_infinite(raw, name)
     if levels is not None:
-        unknown = [0] * columns
-        for j, given in enumerate(levels):
-            unknown[j] = by_given_levels(raw, j, list(given))
+        unknown = [by_given_levels(raw, j, list(given)) for j, given in enumerate(levels)]
         return Table(raw.values, names, [list(given) for given in levels], unknown)
     declared = positions_of(categorical, names, columns)
     found = [by_own_levels(raw, j, j in declared) for j in range(columns)]
-    return Table(raw.values, names, found, [0] * columns)
+    return Table(raw.values, names, found, [{} for _ in range(columns)])
 
 
 def _refuse_series(X: Any) -> NoReturn:

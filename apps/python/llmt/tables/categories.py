@@ -84,8 +84,9 @@ def by_own_levels(raw: Raw, column: int, declared: bool, most: int | None = most
     return levels or (["(none)"] if declared else [])
 
 
-def by_given_levels(raw: Raw, column: int, levels: list[str]) -> int:
-    """Turns the cells of a column into positions in given labels; returns how many have none and became UNKNOWN.
+def by_given_levels(raw: Raw, column: int, levels: list[str]) -> dict[str, int]:
+    """Turns the cells of a column into positions in given labels; returns the words that have none and became UNKNOWN,
+    with the number of their cells.
 
     Without labels the column must be numbers: raises TypeError if it is words other than NA and the like.
     """
@@ -93,7 +94,7 @@ def by_given_levels(raw: Raw, column: int, levels: list[str]) -> int:
     cells = raw.values[:, column]
     here = np.isnan(cells)
     if words is None and not levels:
-        return 0
+        return {}
     if words is None:
         return _numbers_by_level(raw, column, levels)
     index = np.where(here, len(words), cells).astype(np.intp)
@@ -107,13 +108,18 @@ def by_given_levels(raw: Raw, column: int, levels: list[str]) -> int:
                 "it held numbers"
             )
         raw.writable(column)[:] = np.nan
-        return 0
+        return {}
     position = {level: float(k) for k, level in enumerate(levels)}
     raw.writable(column)[:] = np.array([position.get(label, UNKNOWN if label else np.nan) for label in labels])[index]
-    return int(np.array([label != "" and label not in position for label in labels])[index].sum())
+    cells_of = np.bincount(index, minlength=len(labels))
+    unknown: dict[str, int] = {}
+    for label, count in zip(labels, cells_of.tolist(), strict=True):
+        if label and label not in position and count:
+            unknown[label] = unknown.get(label, 0) + count
+    return unknown
 
 
-def _numbers_by_level(raw: Raw, column: int, levels: list[str]) -> int:
+def _numbers_by_level(raw: Raw, column: int, levels: list[str]) -> dict[str, int]:
     """Numbers by the value of the labels that are texts of numbers."""
     position: dict[float, float] = {}
     for k, level in enumerate(levels):
@@ -128,7 +134,8 @@ def _numbers_by_level(raw: Raw, column: int, levels: list[str]) -> int:
         _refuse_merged(raw, column, cells)
     known = np.array([position.get(number, UNKNOWN) for number in numbers.tolist()])
     cells[here] = known[index] if len(known) else np.nan
-    return int((cells[here] == UNKNOWN).sum())
+    of_numbers = np.bincount(index, minlength=len(known)).tolist()
+    return {text_of(number): count for number, count in zip(numbers.tolist(), of_numbers, strict=True) if number not in position}
 
 
 def _refuse_merged(raw: Raw, column: int, cells: np.ndarray) -> None:
