@@ -38,6 +38,20 @@ int side_of(const Node& node, double value) {
   return known ? node.level_side[static_cast<std::size_t>(value)] : 0;
 }
 
+// Whether several rows have one value among those between two thresholds, the upper one included: a round number at which
+// many rows lie, such as a price limit, belongs to one side for a reason.
+bool has_equal_values_between(double one, double other, const std::vector<int>& rows, const RowValues& values,
+                              int input) {
+  const auto [low, high] = std::minmax(one, other);
+  std::vector<double> between;
+  for (const int row : rows) {
+    const double value = values.inputs(row, input);
+    if (value > low && value <= high) between.push_back(value);
+  }
+  std::ranges::sort(between);
+  return std::ranges::adjacent_find(between) != between.end();
+}
+
 }  // namespace
 
 EquationTree::EquationTree(const Sample& sample, std::vector<Node> grown, std::vector<Term> terms, double coarseness)
@@ -104,8 +118,10 @@ bool EquationTree::settle(std::size_t i, double coarseness) {
     const int grain = exponent_below(coarseness * threshold_grain * sample_.input_scale(node.split_input));
     const double in_gap = shortest_between(below, above);
     const double coarse = rounded(node.threshold, grain);
-    // A number in the gap changes nothing. Else the rounding moves rows to the other side.
-    node.threshold = in_gap == rounded(in_gap, grain) || coarse < low || coarse >= high ? in_gap : coarse;
+    // A number in the gap changes nothing. Else the rounding moves rows to the other side, but no equal ones.
+    const bool stays = in_gap == rounded(in_gap, grain) || coarse < low || coarse >= high ||
+                       has_equal_values_between(node.threshold, coarse, training_[i], values, node.split_input);
+    node.threshold = stays ? in_gap : coarse;
   }
   double left = 0.0;
   double right = 0.0;

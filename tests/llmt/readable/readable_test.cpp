@@ -109,6 +109,26 @@ Data mixed(Eigen::Index rows) {
   return data;
 }
 
+TEST(Readable, ARoundNumberAtWhichManyRowsLieIsNotTakenToTheOtherSide) {
+  // Ten a piece, from 1000 pieces on eight. A third of the orders is of exactly 1000 pieces.
+  llmt::Random random(2);
+  Data data{Eigen::MatrixXd(600, 2), Eigen::MatrixXd(600, 1)};
+  for (Eigen::Index i = 0; i < 600; ++i) {
+    const double pieces = i % 3 == 0 ? 1000.0 : std::floor(random.uniform(1.0, 2000.0));
+    data.inputs.row(i) << pieces, static_cast<double>(random.below(5));
+    data.outputs(i, 0) = pieces * (pieces < 1000.0 ? 0.010 : 0.008) + 0.05 * random.normal();
+  }
+  const llmt::ReadableResult result = readable(data, crisp(), 0.15);
+  EXPECT_EQ(result.partitions[0].leaves, 2);
+  Eigen::MatrixXd asked(4, 2);
+  asked << 900, 2, 990, 2, 1000, 2, 1100, 2;
+  const Eigen::MatrixXd y = result.model.predict(asked);
+  EXPECT_NEAR(y(0), 9.0, 0.05);
+  EXPECT_NEAR(y(1), 9.9, 0.05);
+  EXPECT_NEAR(y(2), 8.0, 0.05);
+  EXPECT_NEAR(y(3), 8.8, 0.05);
+}
+
 TEST(Readable, PredictsWhatItsEquationsSayWithinTheTrainingExtent) {
   const Data data = mixed(400);
   for (const llmt::LocalTerms terms : {llmt::LocalTerms::linear, llmt::LocalTerms::quadratic}) {
