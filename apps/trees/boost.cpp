@@ -4,6 +4,7 @@
 
 #include "llmt/boosted.hpp"
 #include "report/fit/boosted_summary.hpp"
+#include "report/fit/mean_of_rows.hpp"
 #include "shared/cli.hpp"
 #include "shared/table_file.hpp"
 #include "trees/boost_command.hpp"
@@ -22,7 +23,10 @@ void boost_command(const CLI::App& command, const BoostArguments& arguments) {
   const BoostResult result = fit_boosted(*table.data, options, bar.callback());
   bar.clear();
   if (!arguments.output.empty()) save(result.model, arguments.output);
-  const report::BoostedRun run{table_name(arguments.learning.data), arguments.output};
+  report::BoostedRun run{table_name(arguments.learning.data), arguments.output};
+  for (const auto& output : table.data->outputs.colwise()) {
+    run.rmse_of_mean.push_back(report::error_of_mean(output, table.data->weights, {}).train);
+  }
   if (arguments.json) {
     print_json(report::boosted_json(run, result));
     return;

@@ -86,11 +86,12 @@ void say_what_is_taken_as_missing(const std::vector<std::string>& names, const r
   }
 }
 
-// Says which columns are inputs although they look like names or numbers of the rows. Nothing is said of inputs that
-// were asked for.
-void look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
-                                const report::InputColumns& inputs) {
-  if (!arguments.inputs.empty()) return;
+// Says which columns are inputs although they look like names or numbers of the rows, or as if some of their numbers
+// were none. Returns those that are left out. Nothing is said of inputs that were asked for.
+std::vector<int> look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
+                                            const report::InputColumns& inputs) {
+  std::vector<int> left_out;
+  if (!arguments.inputs.empty()) return left_out;
   for (const report::AccidentalInput& found : report::accidental_inputs(inputs)) {
     const std::string& name = names[found.input];
     if (found.kind == report::AccidentalInput::Kind::row_numbers) {
@@ -98,11 +99,26 @@ void look_for_accidental_inputs(const LearningArguments& arguments, const std::v
       continue;
     }
     if (contains(arguments.categorical, name)) continue;
+    if (found.kind == report::AccidentalInput::Kind::far_value) {
+      warn(fmt::format("llmt: column \"{}\": {}; if they stand for missing values, empty these cells", name,
+                       found.detail));
+      continue;
+    }
     if (found.kind == report::AccidentalInput::Kind::unit) {
       warn(fmt::format(
-          "llmt: column \"{}\": every cell is a number and \"{}\", and is taken for categories; leave the unit "
-          "out of the cells to have numbers, --categorical says that categories are meant",
-          name, found.unit));
+          "llmt: column \"{}\": every cell is {}, and is taken for categories; write the numbers alone to have "
+          "numbers, --categorical says that categories are meant",
+          name, found.detail));
+      continue;
+    }
+    if (found.is_left_out) {
+      warn(
+          fmt::format("llmt: column \"{}\" has {}, {} different ones in {} rows, and is left out; {}--categorical "
+                      "takes it for categories",
+                      name, found.kind == report::AccidentalInput::Kind::dates ? "dates" : "words",
+                      inputs.levels[found.input].size(), inputs.values.rows(),
+                      found.kind == report::AccidentalInput::Kind::dates ? "give a number, as days; " : ""));
+      left_out.push_back(found.input);
       continue;
     }
     const std::string advice =
@@ -114,6 +130,28 @@ void look_for_accidental_inputs(const LearningArguments& arguments, const std::v
             : "--ignore leaves it out, --categorical says that it is meant";
     warn(fmt::format("llmt: column \"{}\" has words, {} different ones in {} rows, and is taken for categories; {}",
                      name, inputs.levels[found.input].size(), inputs.values.rows(), advice));
+  }
+  std::ranges::sort(left_out);
+  return left_out;
+}
+
+// Takes columns away. One input stays at least.
+void leave_out(const std::vector<int>& columns, std::vector<std::string>& names, report::InputColumns& inputs) {
+  if (columns.empty() || columns.size() == names.size()) return;
+  std::vector<int> kept;
+  for (int column = 0; column < static_cast<int>(names.size()); ++column) {
+    if (!std::ranges::binary_search(columns, column)) kept.push_back(column);
+  }
+  inputs.values = inputs.values(Eigen::all, kept).eval();
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    names[k] = names[static_cast<std::size_t>(kept[k])];
+    inputs.levels[k] = inputs.levels[static_cast<std::size_t>(kept[k])];
+  }
+  names.resize(kept.size());
+  inputs.levels.resize(kept.size());
+  inputs.categorical.clear();
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    if (!inputs.levels[k].empty()) inputs.categorical.push_back(static_cast<int>(k));
   }
 }
 
@@ -210,7 +248,7 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", csv.name()));
   }
-  const std::vector<std::string> inputs = choose_inputs(csv, arguments);
+  std::vector<std::string> inputs = choose_inputs(csv, arguments);
   const report::ColumnAdvice advice{
       .leave_out = arguments.inputs.empty() ? " (--ignore COLUMN leaves a column out)" : "",
       .as_categories = "--categorical"};
@@ -219,8 +257,8 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
       report::read_learning_columns(csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, advice,
                                     largest_input, arguments.options.max_threads);
   look_for_dominant_rows(csv, arguments, columns);
-  look_for_accidental_inputs(arguments, inputs, columns.inputs);
   say_what_is_taken_as_missing(inputs, columns.inputs);
+  leave_out(look_for_accidental_inputs(arguments, inputs, columns.inputs), inputs, columns.inputs);
   look_for_nothing_to_learn(csv, arguments, columns);
   LearningTable table{nullptr, arguments.options, lines_of_rows(csv)};
   FitOptions& options = table.options;

@@ -132,10 +132,11 @@ TEST(Arguments, InputsByAccidentAreNamed) {
   std::string text = "id,name,x,y\n";
   for (int i = 0; i < 60; ++i) text += fmt::format("{},part{},{},{}\n", i + 1, i, (7 * i) % 61, 2 * i);
   folder.write("d.csv", text);
-  EXPECT_EQ(folder.run(llmt_program + " fit d.csv -t y").err,
-            "llmt: column \"name\" has words, 60 different ones in 60 rows, and is taken for categories; --ignore "
-            "leaves it out, --categorical says that it is meant\n"
-            "llmt: column \"id\" numbers the rows and is an input; --ignore leaves it out\n");
+  EXPECT_EQ(
+      folder.run(llmt_program + " fit d.csv -t y").err,
+      "llmt: column \"name\" has words, 60 different ones in 60 rows, and is left out; --categorical takes it for "
+      "categories\n"
+      "llmt: column \"id\" numbers the rows and is an input; --ignore leaves it out\n");
   EXPECT_EQ(folder.run(llmt_program + " fit d.csv -t y --inputs id,x").err, "");
   EXPECT_EQ(folder.run(llmt_program + " fit d.csv -t y --ignore id --categorical name").err, "");
 }

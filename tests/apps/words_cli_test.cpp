@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "apps/programs.hpp"
@@ -138,6 +139,100 @@ TEST(Words, AColumnOfDatesIsCalledSo) {
   for (const std::string word : {"red", "2024-03", "1-2-3-4", "10.0.0.1", "v1.2.3", "2024-03-31x"}) {
     EXPECT_EQ(warning_of({word, "blue"}), "") << word;
     EXPECT_EQ(warning_of({"2024-03-31", word}), "") << word;
+  }
+}
+
+TEST(Words, DatesOfManyDaysAreLeftOut) {
+  const Folder folder;
+  std::string with = "when,x,y\n";
+  std::string without = "x,y\n";
+  for (int i = 0; i < 90; ++i) {
+    const std::string row = fmt::format("{},{}\n", (i * 37) % 90 / 10.0, 2 * ((i * 37) % 90) + i % 2);
+    with += fmt::format("2024-{:02}-{:02},{}", i / 28 + 1, i % 28 + 1, row);
+    without += row;
+  }
+  folder.write("with.csv", with);
+  folder.write("without.csv", without);
+  const Outcome fitted = folder.run(llmt_program + " fit with.csv -t y -o with.json");
+  EXPECT_EQ(fitted.exit_code, 0);
+  EXPECT_NE(
+      fitted.err.find("column \"when\" has dates, 90 different ones in 90 rows, and is left out; give a number, as "
+                      "days; --categorical takes it for categories"),
+      std::string::npos)
+      << fitted.err;
+  folder.run(llmt_program + " fit without.csv -t y -o without.json");
+  EXPECT_EQ(llmt::read_file(folder.file("with.json")), llmt::read_file(folder.file("without.json")));
+  EXPECT_EQ(folder.run(llmt_program + " predict with.json with.csv").exit_code, 0);
+  EXPECT_EQ(folder.run(llmt_program + " fit with.csv -t y --inputs when,x -o m.json").err.find("left out"),
+            std::string::npos);
+}
+
+TEST(Words, ColumnsThatNumberTheRowsAreNamed) {
+  const Folder folder;
+  const auto names_it = [&](int rows, const std::function<int(int)>& id) {
+    std::string text = "id,x,y\n";
+    for (int i = 0; i < rows; ++i) text += fmt::format("{},{},{}\n", id(i), i % 7, 2 * (i % 7) + i % 3);
+    folder.write("d.csv", text);
+    return folder.run(llmt_program + " fit d.csv -t y --cv 0").err.find("column \"id\" numbers the rows") !=
+           std::string::npos;
+  };
+  EXPECT_TRUE(names_it(30, [](int i) { return i; }));
+  EXPECT_TRUE(names_it(30, [](int i) { return 100001 + i; }));
+  EXPECT_TRUE(names_it(30, [](int i) { return 10 * i + 10; }));
+  EXPECT_TRUE(names_it(30, [](int i) { return 3 * i + i * i % 3; }));
+  EXPECT_TRUE(names_it(30, [](int i) { return 500 - 2 * i; }));
+  EXPECT_TRUE(names_it(101, [](int i) { return 1000 + i * 37 % 101; }));  // in another order
+  EXPECT_FALSE(names_it(97, [](int i) { return i * 37 % 97; }));          // of few rows that may be meant
+  EXPECT_FALSE(names_it(101, [](int i) { return i * 37 % 101 / 2; }));    // twice each
+  EXPECT_FALSE(names_it(30, [](int i) { return i - i % 2; }));
+  EXPECT_FALSE(names_it(19, [](int i) { return i; }));
+}
+
+TEST(Words, EqualValuesFarFromAllOthersAreNamed) {
+  const Folder folder;
+  const auto said = [&](const std::string& value, int every) {
+    std::string text = "x,z,y\n";
+    for (int i = 0; i < 60; ++i) {
+      const std::string cell = i % every == 1 ? value : fmt::format("{}", (i * 7) % 20 / 2.0);
+      text += fmt::format("{},{},{}\n", cell, i % 11, 2 * (i % 11));
+    }
+    folder.write("d.csv", text);
+    return folder.run(llmt_program + " fit d.csv -t y --cv 0").err;
+  };
+  EXPECT_EQ(
+      said("-999", 7),
+      "llmt: column \"x\": 9 of 60 cells are -999, far from all others (0 to 9.5); if they stand for missing values, "
+      "empty these cells\n");
+  EXPECT_NE(said("9999", 15).find("4 of 60 cells are 9999, far from all others (0 to 9.5)"), std::string::npos);
+  EXPECT_EQ(said("-8", 7), "");     // not far
+  EXPECT_EQ(said("-999", 40), "");  // two cells
+}
+
+TEST(Words, NumbersThatAreWrittenWithUnitsAreNamed) {
+  const Folder folder;
+  const auto said = [&](const std::function<std::string(int)>& cell) {
+    std::string text = "x;price;y\n";
+    for (int i = 0; i < 60; ++i) text += fmt::format("{};{};{}\n", i % 11, cell(i), 2 * (i % 11));
+    folder.write("d.csv", text);
+    const std::string err = folder.run(llmt_program + " fit d.csv -t y --cv 0").err;
+    const std::size_t begin = err.find("every cell is ");
+    return begin == std::string::npos ? "" : err.substr(begin + 14, err.find(", and is taken") - begin - 14);
+  };
+  EXPECT_EQ(said([](int i) { return fmt::format("{}.5 kg", i); }), "a number and \"kg\"");
+  EXPECT_EQ(said([](int i) { return fmt::format("CHF 1'{}.5", 200 + i); }),
+            "\"CHF\" and a number with apostrophes between thousands");
+  EXPECT_EQ(said([](int i) { return fmt::format("\u20ac {}", i); }), "\"\u20ac\" and a number");
+  EXPECT_EQ(said([](int i) { return fmt::format("1\u202f{},50", 200 + i); }), "a number with blanks between thousands");
+  EXPECT_EQ(said([](int i) { return fmt::format("{}%", i); }), "a number and \"%\"");
+  EXPECT_EQ(said([](int i) { return fmt::format("P{}", i % 9); }), "");
+  EXPECT_EQ(said([](int i) { return fmt::format("shop {}", i % 9); }), "");
+}
+
+TEST(Words, TablesOfErrorsHaveTheMeanOfTheRows) {
+  const Folder folder;
+  folder.write("d.csv", line_and_noise(60));
+  for (const char* command : {"fit d.csv -t y", "fit d.csv -t y --boost", "compare d.csv -t y"}) {
+    EXPECT_NE(folder.run(llmt_program + " " + command).out.find("mean of the rows"), std::string::npos) << command;
   }
 }
 

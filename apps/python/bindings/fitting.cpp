@@ -160,21 +160,22 @@ std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const 
   return std::make_unique<Fit>(std::move(data), options_of(options), readable_loss, teach, report);
 }
 
-// Inputs that look as if nobody meant them: (kind, position, unit).
-std::vector<std::tuple<std::string, int, std::string>> accidental(const Array& inputs,
-                                                                  std::vector<std::vector<std::string>> levels) {
+// Inputs that look as if nobody meant them: (kind, position, detail, whether it is left out).
+std::vector<std::tuple<std::string, int, std::string, bool>> accidental(const Array& inputs,
+                                                                        std::vector<std::vector<std::string>> levels) {
   using Why = report::AccidentalInput::Kind;
   report::InputColumns columns{.values = rows_of(inputs), .levels = std::move(levels), .categorical = {}};
   for (int j = 0; j < static_cast<int>(columns.levels.size()); ++j) {
     if (!columns.levels[j].empty()) columns.categorical.push_back(j);
   }
-  std::vector<std::tuple<std::string, int, std::string>> found;
+  std::vector<std::tuple<std::string, int, std::string, bool>> found;
   for (const report::AccidentalInput& input : report::accidental_inputs(columns)) {
-    const char* kind = input.kind == Why::words   ? "words"
-                       : input.kind == Why::dates ? "dates"
-                       : input.kind == Why::unit  ? "unit"
-                                                  : "row_numbers";
-    found.emplace_back(kind, input.input, input.unit);
+    const char* kind = input.kind == Why::words       ? "words"
+                       : input.kind == Why::dates     ? "dates"
+                       : input.kind == Why::unit      ? "unit"
+                       : input.kind == Why::far_value ? "far_value"
+                                                      : "row_numbers";
+    found.emplace_back(kind, input.input, input.detail, input.is_left_out);
   }
   return found;
 }

@@ -9,21 +9,29 @@ from .tables import Table
 from .tables.raw import number_hint
 
 
-def warn_of_accidental_inputs(table: Table, meant: set[str], stacklevel: int) -> None:
-    """Warns of columns that look like names, dates or numbers of the rows. Tables without names are not looked at:
-    their columns were chosen by hand."""
+def warn_of_accidental_inputs(table: Table, meant: set[str], stacklevel: int) -> list[int]:
+    """Warns of columns that look like names, dates or numbers of the rows, or as if some of their numbers were none.
+    Returns the positions of those that are left out. Tables without names are not looked at: their columns were chosen
+    by hand."""
+    left_out: list[int] = []
     if table.names is None:
-        return
-    for kind, position, unit in _core.accidental_inputs(table.values, table.levels):
+        return left_out
+    for kind, position, detail, is_left_out in _core.accidental_inputs(table.values, table.levels):
         name = table.names[position]
         if name in meant:
             continue
         if kind == "row_numbers":
             text = "numbers the rows and is an input; leave it out of X if it is not meant"
+        elif kind == "far_value":
+            text = f"looks as if numbers stood for missing values: {detail}; if they do, make them NaN"
         elif kind == "unit":
+            text = f"has {detail} in every cell, and is taken for categories; give the numbers alone to have numbers"
+        elif is_left_out and (kind == "dates" or not number_hint(table.levels[position], "")):
+            left_out.append(position)
             text = (
-                f'has a number and "{unit}" in every cell, and is taken for categories; leave the unit out of the '
-                "cells to have numbers"
+                f"has {kind}, {len(table.levels[position])} different ones in {len(table.values)} rows, and is left out; "
+                + ("give a number, as days; " if kind == "dates" else "")
+                + "categorical_features takes it for categories"
             )
         elif kind == "dates":
             text = "looks like a date and is taken for categories; give a number, as days, or leave it out of X"
@@ -35,6 +43,7 @@ def warn_of_accidental_inputs(table: Table, meant: set[str], stacklevel: int) ->
                 "categories; leave it out of X if they are names of the rows, or name it in categorical_features"
             )
         warnings.warn(f'column "{name}" {text}', stacklevel=stacklevel)
+    return left_out if len(left_out) < len(table.names) else []
 
 
 def warn_of_few_rows(rows: int, stacklevel: int) -> None:

@@ -237,7 +237,8 @@ class TableRegressor(RegressorMixin, BaseEstimator):
             outputs = np.vstack([outputs, judged])
             weights = None if weights is None else np.concatenate([weights, np.ones(len(judged))])
         meant = {str(name) for name in self.categorical_features}
-        _advice.warn_of_accidental_inputs(table, meant, stacklevel=4)
+        for position in _advice.warn_of_accidental_inputs(table, meant, stacklevel=4):
+            table.values[:, position] = 0.0  # one level in all rows, of which nothing can be learned
         _advice.check_targets(outputs, self._outputs, self._robust(), stacklevel=4)
         _advice.warn_of_few_rows(rows, stacklevel=4)
         return FitRows(table, outputs, weights, labels, held_out, rows, (X, y, groups))

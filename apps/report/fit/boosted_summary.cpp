@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "report/fit/mean_of_rows.hpp"
+
 namespace llmt::report {
 namespace {
 
@@ -72,6 +74,9 @@ std::string boosted_text(const BoostedRun& run, const BoostResult& result, std::
                number(result.model.sums()[o].rate), number(summary.rmse),
                summary.held_out == summary.rows ? number(summary.spread, 2) : "-", number(summary.train_rmse),
                fmt::format("{}", summary.held_out)});
+    if (o < run.rmse_of_mean.size()) {
+      table.add({"  against", mean_of_rows, "", "", number(run.rmse_of_mean[o]), "-", "", ""});
+    }
   }
   text += table.text(width);
   for (std::size_t o = 0; o < result.summaries.size(); ++o) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "llmt/boosted.hpp"
 #include "report/text/json.hpp"
@@ -11,8 +12,9 @@
 namespace llmt::report {
 
 struct BoostedRun {
-  std::string data;    ///< the name of the table
-  std::string output;  ///< the file of the model; empty: none
+  std::string data;                       ///< the name of the table
+  std::string output;                     ///< the file of the model; empty: none
+  std::vector<double> rmse_of_mean = {};  ///< one a target: of the mean of the rows; empty: not shown
 };
 
 /// Rows, trees, errors and the variants that were compared, for every target.

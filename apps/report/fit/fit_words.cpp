@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "report/fit/kinds.hpp"
+#include "report/fit/mean_of_rows.hpp"
 
 namespace llmt::report {
 namespace {
@@ -193,8 +194,8 @@ void add_data(const FitRun& run, const FitResult& result, Document& words) {
   }
 }
 
-// The chosen model of every target, and below it the best of the other kinds.
-Json models_table(const FitResult& result) {
+// The chosen model of every target, below it the best of the other kinds, and the mean of the rows.
+Json models_table(const FitRun& run, const FitResult& result) {
   Grid table{.header = {"target", "model", "leaves", "RMSE held-out", "spread of folds", "RMSE in-sample"},
              .rows = {},
              .words = {1},
@@ -211,6 +212,10 @@ Json models_table(const FitResult& result) {
         table.rows.push_back({"  against", kind_of(other.candidate), fmt::format("{}", other.candidate.leaves),
                               number(other.rmse), spread_text(other.spread, partition.cv_folds), ""});
       }
+      if (partition.outputs.size() > 1) continue;  // whose errors are relative
+      const ErrorOfMean mean = error_of_mean(run, result, partition.outputs[o]);
+      table.rows.push_back({"  against", mean_of_rows, "", std::isnan(mean.rmse) ? "-" : number(mean.rmse),
+                            spread_text(mean.spread, partition.cv_folds), number(mean.train)});
     }
   }
   return block(table);
@@ -281,7 +286,7 @@ Document fit_words(const FitRun& run, const FitResult& result) {
   add_local_models(run, result.summary, lines);
   for (const PartitionSummary& partition : partitions) add_search(partition.search, lines);
   if (!run.output.empty()) lines.push_back(fmt::format("Model written to {}", run.output));
-  words.sections.push_back({"What was compared", "", {models_table(result)}});
+  words.sections.push_back({"What was compared", "", {models_table(run, result)}});
   if (!lines.empty()) words.sections.back().blocks.push_back(text_block("", lines));
   return words;
 }

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "report/document/figures.hpp"
+#include "report/fit/mean_of_rows.hpp"
 #include "report/text/text.hpp"
 
 namespace llmt::report {
@@ -72,7 +73,7 @@ Chart folds_chart(const Compared& of) {
   return chart;
 }
 
-Json methods_table(const Compared& of) {
+Json methods_table(const Compared& of, double rmse_of_mean) {
   Grid grid{.header = {"method", "leaves", "parameters", "RMSE held-out", "spread of folds", "in 90 %", "CRPS",
                        "largest jump", "fit, s", "predict 1e6 rows, s"},
             .rows = {},
@@ -86,6 +87,7 @@ Json methods_table(const Compared& of) {
                          std::isnan(method.largest_jump) ? "-" : number(method.largest_jump, 3),
                          number(method.fit_seconds, 2), number(method.predict_seconds, 2)});
   }
+  grid.rows.push_back({mean_of_rows, "-", "1", number(rmse_of_mean), "-", "-", "-", "-", "-", "-"});
   return block(grid);
 }
 
@@ -122,6 +124,8 @@ Document comparison_report(const FitRun& run, const std::string& target, const C
     const Eigen::Index weighted = rows.weights.size() > 0 ? (rows.weights.array() > 0.0).count() : rows.inputs.rows();
     document.notes = {left_out_by_loss(lines_at(run.lines, left_out), weighted)};
   }
+  Eigen::VectorXd weights = rows.weights.size() > 0 ? rows.weights : Eigen::VectorXd::Ones(rows.outputs.rows()).eval();
+  if (result.loss_weights.size() > 0) weights = (result.loss_weights.array() > 0.0).select(weights, 0.0);
   document.main = errors_chart(of);
   document.beside_main = {block(trade(of, "Error over size", "parameters", [](const Comparison& method) {
     return static_cast<double>(method.parameters);
@@ -131,7 +135,7 @@ Document comparison_report(const FitRun& run, const std::string& target, const C
                                {block(folds_chart(of)),
                                 block(trade(of, "Error over time", "time of a fit, s",
                                             [](const Comparison& method) { return method.fit_seconds; })),
-                                methods_table(of)}});
+                                methods_table(of, error_of_mean(rows.outputs.col(0), weights, {}).train)}});
   return document;
 }
 
