@@ -240,7 +240,8 @@ TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
   const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y -o m.json --readable --cv 3");
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
   for (const char* text :
-       {"readable", "least squares", "at most 15 % above that of the best crisp tree", "m.readable.json"}) {
+       {"readable", "least squares", "at most 15 % above that of the best crisp tree", "m.readable.json",
+        "The readable tree has a smaller held-out error than the model chosen above."}) {
     EXPECT_NE(fitted.out.find(text), std::string::npos) << fitted.out;
   }
   // Held-out errors are those of rows that the fit has not seen, here by the printed rules and by least squares.
@@ -271,6 +272,39 @@ TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
   const Outcome without_file = folder.run(llmt_program + " fit d.csv -t y --readable=50 --validity crisp --cv 3");
   EXPECT_NE(without_file.out.find("at most 50 % above"), std::string::npos) << without_file.out;
   EXPECT_EQ(without_file.out.find("written to"), std::string::npos) << without_file.out;
+}
+
+TEST(ReadableProgram, ThePriceIsSaidBesideTheChosenModel) {
+  const Folder folder;
+  llmt::Random random(8);
+  std::string text = "a,y\n";
+  for (int i = 0; i < 400; ++i) {
+    const double a = random.uniform(-3.0, 3.0);
+    text += fmt::format("{},{}\n", a, 10.0 * std::sin(2.0 * a) + 0.2 * random.normal());  // blends are better
+  }
+  folder.write("d.csv", text);
+  const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y --readable=200");
+  const std::size_t begin = fitted.out.find("Reading costs ");
+  ASSERT_NE(begin, std::string::npos) << fitted.out;
+  double cost = 0.0;
+  double low = 0.0;
+  double high = 0.0;
+  double readable = 0.0;
+  double chosen = 0.0;
+  ASSERT_EQ(
+      std::sscanf(fitted.out.c_str() + begin,
+                  "Reading costs %lf %% more error (over the folds %lf to %lf %%): RMSE held-out %lf in the place "
+                  "of %lf.",
+                  &cost, &low, &high, &readable, &chosen),
+      5)
+      << fitted.out;
+  EXPECT_NEAR(cost, 100.0 * (readable / chosen - 1.0), 0.6);
+  EXPECT_LE(low, cost);
+  EXPECT_GE(high, cost);
+  const json summary = json::parse(folder.run(llmt_program + " fit d.csv -t y --readable=200 --json").out);
+  EXPECT_NEAR(summary["readable"][0]["cv_rmse"].get<double>(), readable, 5e-4 * readable);
+  EXPECT_NEAR(summary["partitions"][0]["cv_rmse"].get<double>(), chosen, 5e-4 * chosen);
+  EXPECT_GT(summary["partitions"][0]["importance"][0][0]["increase"].get<double>(), 5.0);
 }
 
 TEST(ReadableProgram, WrongUseIsRefusedBeforeTheWork) {

@@ -38,8 +38,8 @@ int side_of(const Node& node, double value) {
   return known ? node.level_side[static_cast<std::size_t>(value)] : 0;
 }
 
-// Whether several rows have one value among those between two thresholds, the upper one included: a round number at which
-// many rows lie, such as a price limit, belongs to one side for a reason.
+// Whether several rows have one value among those between two thresholds, the upper one included: a round number at
+// which many rows lie, such as a price limit, belongs to one side for a reason.
 bool has_equal_values_between(double one, double other, const std::vector<int>& rows, const RowValues& values,
                               int input) {
   const auto [low, high] = std::minmax(one, other);
