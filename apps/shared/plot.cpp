@@ -163,6 +163,9 @@ std::string bar_labels(const Chart& chart) {
 std::string axis_lines(const Axis& axis, const char* which) {
   std::string text = fmt::format("set {}label {}\n", which, quoted(axis.title));
   if (axis.log) text += fmt::format("set logscale {}\n", which);
+  if (axis.range) {
+    text += fmt::format("set {}range [{}:{}]\n", which, value_text(axis.range->first), value_text(axis.range->second));
+  }
   if (axis.categories.empty()) return text;
   std::string places;
   for (std::size_t k = 0; k < axis.categories.size(); ++k) {

@@ -13,6 +13,7 @@
 #include "report/document/page.hpp"
 #include "report/fit/comparison.hpp"
 #include "report/fit/fit_summary.hpp"
+#include "report/fit/mean_of_rows.hpp"
 #include "report/fit/of_fit.hpp"
 #include "report/model/leaves.hpp"
 #include "report/model/rule_text.hpp"
@@ -113,6 +114,48 @@ TEST(Report, FitShowsEveryRowByAModelThatHadNotSeenIt) {
   EXPECT_NE(text.find("\ntarget     model"), std::string::npos) << text;
   EXPECT_NE(text.find("\nTree grown by RD (the default), at least "), std::string::npos) << text;
   EXPECT_EQ(page.dump().find("folder"), std::string::npos);
+}
+
+TEST(Report, FitSaysWhatMattersAndDrawsCurvesOnOneAxis) {
+  const Json page = to_json(report_of(jumping(400)));
+  const Json& matters = page["sections"][0]["blocks"][1];
+  EXPECT_EQ(matters["title"], "What matters");
+  EXPECT_EQ(matters["y"]["categories"], Json::array({"x2", "x1"}));  // a jump of 3, a slope of 2
+  const Json& bars = matters["layers"][0];
+  for (int k = 0; k < 2; ++k) {
+    // An exchanged input adds twice the variance of its part to the squared noise.
+    const double expected = std::sqrt(0.01 + 2.0 * (k == 0 ? 9.0 / 4.0 : 4.0 / 12.0)) - 0.1;
+    EXPECT_NEAR(bars["y"][k].get<double>(), expected, 0.3);
+    EXPECT_LT(bars["low"][k], bars["y"][k]);
+    EXPECT_GT(bars["high"][k], bars["y"][k]);
+  }
+  int curves = 0;
+  Json range;
+  for (const Json& section : page["sections"]) {
+    if (section["title"] != "What it says") continue;
+    for (const Json& each : section["blocks"]) {
+      if (!each.value("title", "").starts_with("Along ")) continue;
+      ++curves;
+      if (range.is_null()) range = each["y"]["range"];
+      EXPECT_EQ(each["y"]["range"], range);
+      EXPECT_EQ(each["layers"].size(), 27U);  // 25 rows, their mean, and where rows lie
+      EXPECT_EQ(each["layers"].back()["mark"], "points");
+      EXPECT_EQ(each["layers"].back()["x"].size(), 200U);
+    }
+  }
+  EXPECT_EQ(curves, 2);
+}
+
+TEST(Report, TheMeanOfTheRowsIsThatOfTheOtherFolds) {
+  const Eigen::Vector4d y(0.0, 2.0, 4.0, 6.0);
+  const ErrorOfMean error = error_of_mean(y, {}, {{0, 1}, {2, 3}});
+  // The mean of the others is 5, then 1: errors 5, 3, 3, 5.
+  EXPECT_NEAR(error.rmse, std::sqrt(17.0), 1e-12);
+  EXPECT_NEAR(error.spread, 0.0, 1e-12);
+  EXPECT_NEAR(error.train, std::sqrt(5.0), 1e-12);
+  EXPECT_NEAR(error_of_mean(y, Eigen::Vector4d(1.0, 1.0, 0.0, 0.0), {}).train, 1.0, 1e-12);
+  EXPECT_TRUE(std::isnan(error_of_mean(y, {}, {}).rmse));
+  EXPECT_TRUE(std::isnan(error_of_mean(y, {}, {{0, 1, 2, 3}}).rmse));
 }
 
 TEST(Report, RowsThatTheLossLeftOutAreSaid) {

@@ -22,6 +22,7 @@ Json axis(const Axis& from) {
   Json json = {{"title", from.title}};
   if (from.log) json["log"] = true;
   if (!from.categories.empty()) json["categories"] = from.categories;
+  if (from.range) json["range"] = numbers({from.range->first, from.range->second});
   return json;
 }
 

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "report/text/json.hpp"
@@ -24,7 +25,8 @@ Numbers numbers_of(const Eigen::Ref<const Eigen::VectorXd>& values);
 struct Axis {
   std::string title = {};  ///< with the unit: "error, mm"
   bool log = false;
-  std::vector<std::string> categories = {};  ///< names of the places 0, 1, 2, ...
+  std::vector<std::string> categories = {};             ///< names of the places 0, 1, 2, ...
+  std::optional<std::pair<double, double>> range = {};  ///< from where to where; empty: by the data
 };
 
 enum class Mark { points, line, bars, band };
@@ -41,7 +43,7 @@ struct Layer {
   Numbers base = {};                     ///< where bars begin; empty: at 0
   std::vector<std::string> labels = {};  ///< at the ends of bars
   std::vector<std::string> roles = {};   ///< of each bar; empty: all have `role`
-  int size = 0;                          ///< of points, in pixels; 0: by their number
+  int size = 0;                          ///< of points, or the width of a line, in pixels; 0: by their number, usual
   bool dashed = false;
   bool steps = false;
   bool horizontal = false;  ///< bars: x is the place, y the length

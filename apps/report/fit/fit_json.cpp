@@ -3,7 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "report/fit/fit_shape.hpp"
 #include "report/fit/fit_summary.hpp"
+#include "report/fit/mean_of_rows.hpp"
 
 namespace llmt::report {
 namespace {
@@ -30,6 +32,17 @@ Json equal_rows_json(const std::optional<EqualRowErrors>& errors) {
                {"cv_rmse_known", Json::array()}};
   for (const double rmse : errors->rmse_new) json["cv_rmse_new"].push_back(finite_or_null(rmse));
   for (const double rmse : errors->rmse_known) json["cv_rmse_known"].push_back(finite_or_null(rmse));
+  return json;
+}
+
+// By how much the error grows without each input, and the standard error of that.
+Json importance_json(const Model& model, const PermutationImportance& found, Eigen::Index output) {
+  Json json = Json::array();
+  for (Eigen::Index j = 0; j < model.num_inputs(); ++j) {
+    json.push_back({{"input", model.inputs()[static_cast<std::size_t>(j)].name},
+                    {"increase", finite_or_null(found.increase(output, j))},
+                    {"standard_error", finite_or_null(found.standard_error(output, j))}});
+  }
   return json;
 }
 
@@ -64,6 +77,8 @@ Json fit_json(const FitRun& run, const FitResult& result) {
                      {"cv_rmse_as_codes", codes.rmse_as_codes}};
   }
   json["local_models"] = result.summary.quadratic ? "quadratic" : "linear";
+  const std::optional<PermutationImportance> found = held_out_importance(
+      result, run.rows.inputs, run.rows.outputs, counted_weights(run, result), run.options.max_threads);
   json["partitions"] = Json::array();
   for (const PartitionSummary& partition : result.summary.partitions) {
     Json entry;
@@ -103,6 +118,11 @@ Json fit_json(const FitRun& run, const FitResult& result) {
     entry["cv_rmse_least_squares"] = judged ? Json(least_squares_rmse(partition)) : Json(nullptr);
     entry["crisp_cv_rmse_by_leaves"] =
         std::vector<double>(partition.crisp_cv_rmse.begin(), partition.crisp_cv_rmse.end());
+    if (found) {
+      entry["importance"] = Json::array();  // one a target
+      for (const int output : partition.outputs)
+        entry["importance"].push_back(importance_json(result.model, *found, output));
+    }
     if (!result.summary.other_terms.empty()) {
       entry["other_terms"] = candidate_json(result.summary.other_terms[json["partitions"].size()]);
     }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "llmt/explain.hpp"
@@ -40,45 +41,130 @@ Chart importance_chart(const Model& model, const Eigen::VectorXd& shares, const 
   return chart;
 }
 
+std::optional<PermutationImportance> held_out_importance(const FitResult& result, const Eigen::MatrixXd& inputs,
+                                                         const Eigen::MatrixXd& outputs, const Eigen::VectorXd& weights,
+                                                         int max_threads) {
+  const std::vector<Model>& models = result.intervals.models();
+  if (models.empty() || models.size() != result.summary.held_out.size()) return std::nullopt;
+  return permutation_importance(models, inputs, outputs, result.summary.held_out, weights,
+                                {.max_threads = max_threads});
+}
+
+Chart increase_chart(const Model& model, const PermutationImportance& found, Eigen::Index output) {
+  const Eigen::VectorXd increase = found.increase.row(output).transpose();
+  std::vector<std::string> names;
+  Numbers values;
+  for (const int j : by_importance(increase)) {
+    if (std::ssize(names) == most_shown_inputs) break;
+    names.push_back(model.inputs()[j].name);
+    values.push_back(increase(j));
+  }
+  Chart chart =
+      ranking("What matters", fmt::format("RMSE of {} grows by", model.outputs()[output].name), names, values, {});
+  Layer& bars = chart.layers.front();
+  for (const int j : by_importance(increase)) {
+    if (bars.low.size() == names.size()) break;
+    const double twice = 2.0 * found.standard_error(output, j);
+    bars.low.push_back(increase(j) - twice);
+    bars.high.push_back(increase(j) + twice);
+    bars.roles.push_back(increase(j) > twice ? "model" : "muted");
+  }
+  chart.caption =
+      "By how much the error on rows held out grows when the values of an input are exchanged between rows. Whiskers: "
+      "two "
+      "standard errors; grey: within them.";
+  return chart;
+}
+
+namespace {
+
+constexpr Eigen::Index averaged_rows = 200;
+constexpr Eigen::Index thin_lines = 25;
+
+// Where an input is looked at: all levels, or 41 places from the smallest to the largest value of training.
+Numbers places_of(const InputColumn& column) {
+  if (!column.is_categorical()) return steps_between(column.low, column.high, 41);
+  Numbers places = column.codes;
+  while (places.size() < column.levels.size()) places.push_back(static_cast<double>(places.size()));
+  if (column.has_empty_level()) places.back() = std::nan("");
+  return places;
+}
+
+// Predictions of one output, rows x places, with an input at each of the places.
+Eigen::MatrixXd along(const Model& model, Eigen::MatrixXd rows, int input, const Numbers& places, Eigen::Index output) {
+  Eigen::MatrixXd predicted(rows.rows(), std::ssize(places));
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    rows.col(input).setConstant(places[k]);
+    predicted.col(static_cast<Eigen::Index>(k)) = model.predict(rows).col(output);
+  }
+  return predicted;
+}
+
+}  // namespace
+
 Chart slice(const Fitted& fitted, Eigen::Index output, int input) {
   const Model& model = fitted.result.model;
   const InputColumn& column = model.inputs()[input];
-  const int places = column.is_categorical() ? static_cast<int>(column.levels.size()) : 161;
-  Eigen::MatrixXd queries = reference_point(model).transpose().replicate(places, 1);
-  Numbers xs = column.is_categorical() ? Numbers() : steps_between(column.low, column.high, places);
-  for (int k = 0; k < places && column.is_categorical(); ++k) xs.push_back(k);
-  for (int k = 0; k < places; ++k) queries(k, input) = xs[k];
-  if (!column.codes.empty()) {
-    for (std::size_t k = 0; k < column.codes.size(); ++k)
-      queries(static_cast<Eigen::Index>(k), input) = column.codes[k];
-  }
-  if (column.has_empty_level()) queries(places - 1, input) = std::nan("");
+  const Numbers places = places_of(column);
+  const Eigen::MatrixXd rows = fitted.inputs(thinned(fitted.inputs.rows(), averaged_rows), Eigen::all);
+  const Eigen::MatrixXd predicted = along(model, rows, input, places, output);
   Chart chart{.title = fmt::format("Along {}", column.name),
               .x = {column.name},
               .y = {model.outputs()[output].name},
               .layers = {}};
+  const Numbers means = numbers_of(predicted.colwise().mean().transpose());
   if (column.is_categorical()) {
-    for (std::size_t k = 0; k < column.levels.size(); ++k) chart.x.categories.push_back(column.shown_level(k));
-    chart.layers.push_back(
-        {.mark = Mark::bars, .role = "model", .x = xs, .y = numbers_of(model.predict(queries).col(output))});
+    Numbers positions;
+    for (std::size_t k = 0; k < column.levels.size(); ++k) {
+      chart.x.categories.push_back(column.shown_level(k));
+      positions.push_back(static_cast<double>(k));
+    }
+    chart.layers.push_back({.mark = Mark::points, .role = "model", .x = positions, .y = means, .size = 10});
     return chart;
+  }
+  for (const Eigen::Index row : thinned(predicted.rows(), thin_lines)) {
+    chart.layers.push_back(
+        {.mark = Mark::line, .role = "muted", .x = places, .y = numbers_of(predicted.row(row).transpose()), .size = 1});
   }
   const bool readable = fitted.readable.has_value();
   if (readable) {
-    const Model& rules = fitted.readable->model;
+    const Eigen::MatrixXd by_rules = along(fitted.readable->model, rows, input, places, output);
     chart.layers.push_back({.mark = Mark::line,
                             .name = "readable tree",
                             .role = "before",
-                            .x = xs,
-                            .y = numbers_of(rules.predict(queries).col(output)),
+                            .x = places,
+                            .y = numbers_of(by_rules.colwise().mean().transpose()),
                             .dashed = true});
   }
-  chart.layers.push_back({.mark = Mark::line,
-                          .name = readable ? "model" : "",
-                          .role = "model",
-                          .x = xs,
-                          .y = numbers_of(model.predict(queries).col(output))});
+  chart.layers.push_back(
+      {.mark = Mark::line, .name = readable ? "model" : "", .role = "model", .x = places, .y = means});
   return chart;
+}
+
+void on_one_axis(const Fitted& fitted, const std::vector<int>& inputs, std::vector<Chart>& slices) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const Chart& chart : slices) {
+    for (const Layer& layer : chart.layers) {
+      for (const double y : layer.y) {
+        if (!std::isfinite(y)) continue;
+        low = std::min(low, y);
+        high = std::max(high, y);
+      }
+    }
+  }
+  if (!(low < high)) return;
+  const double margin = 0.06 * (high - low);
+  for (std::size_t k = 0; k < slices.size(); ++k) {
+    slices[k].y.range = {low - margin, high + 0.5 * margin};
+    if (!slices[k].x.categories.empty()) continue;
+    Layer rug{.role = "data", .size = 3};
+    for (const Eigen::Index row : thinned(fitted.inputs.rows(), averaged_rows)) {
+      rug.x.push_back(fitted.inputs(row, inputs[k]));
+      rug.y.push_back(low - 0.6 * margin);
+    }
+    slices[k].layers.push_back(std::move(rug));
+  }
 }
 
 Chart waterfall(const Fitted& fitted, Eigen::Index output) {

@@ -32,14 +32,18 @@ ErrorOfMean error_of_mean(const Eigen::Ref<const Eigen::VectorXd>& output, const
   return error;
 }
 
-ErrorOfMean error_of_mean(const FitRun& run, const FitResult& result, Eigen::Index output) {
+Eigen::VectorXd counted_weights(const FitRun& run, const FitResult& result) {
   Eigen::VectorXd weights = run.rows.weights;
   const Eigen::VectorXd& loss = result.summary.loss_weights;
   if (loss.size() > 0) {
     if (weights.size() == 0) weights = Eigen::VectorXd::Ones(loss.size());
     weights = (loss.array() > 0.0).select(weights, 0.0);
   }
-  return error_of_mean(run.rows.outputs.col(output), weights, result.summary.held_out);
+  return weights;
+}
+
+ErrorOfMean error_of_mean(const FitRun& run, const FitResult& result, Eigen::Index output) {
+  return error_of_mean(run.rows.outputs.col(output), counted_weights(run, result), result.summary.held_out);
 }
 
 }  // namespace llmt::report

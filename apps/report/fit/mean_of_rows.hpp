@@ -23,6 +23,9 @@ struct ErrorOfMean {
 ErrorOfMean error_of_mean(const Eigen::Ref<const Eigen::VectorXd>& output, const Eigen::VectorXd& weights,
                           const std::vector<std::vector<Eigen::Index>>& held_out);
 
+/// Weights of the rows of a fit, 0 of those that its loss left out; empty: all 1.
+Eigen::VectorXd counted_weights(const FitRun& run, const FitResult& result);
+
 /// The same of the rows of a fit, without those that its loss left out.
 ErrorOfMean error_of_mean(const FitRun& run, const FitResult& result, Eigen::Index output);
 

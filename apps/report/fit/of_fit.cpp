@@ -45,17 +45,22 @@ void add_output(const Fitted& fitted, std::size_t p, std::size_t o, bool alone, 
   const std::string of = alone ? "" : " of " + name;
   const HeldOutRows rows = held_out(fitted, output);
   const Chart main = predicted_against_observed(rows, name);
-  const Eigen::VectorXd shares = importance(model, fitted.inputs, fitted.options.max_threads).row(output).transpose();
-  const std::vector<int> order = by_importance(shares);
+  const std::optional<PermutationImportance> found =
+      held_out_importance(fitted.result, fitted.inputs, fitted.outputs, {}, fitted.options.max_threads);
+  const Eigen::VectorXd weights =
+      found ? found->increase.row(output).transpose().eval()
+            : importance(model, fitted.inputs, fitted.options.max_threads).row(output).transpose().eval();
+  const std::vector<int> order = by_importance(weights);
+  const Chart what_matters = found ? increase_chart(model, *found, output) : importance_chart(model, weights, order);
   if (!document.main) {
     document.answer = sentence(rows, partition, name);
     document.lead = lead(fitted, rows, partition, p);
     document.main = main;
-    document.beside_main = {block(importance_chart(model, shares, order))};
+    document.beside_main = {block(what_matters)};
   } else {
     document.sections.push_back({fmt::format("{}: how well", name),
                                  sentence(rows, partition, name) + " " + lead(fitted, rows, partition, p),
-                                 {block(main), block(importance_chart(model, shares, order))}});
+                                 {block(main), block(what_matters)}});
   }
   if (o == 0) {
     if (fitted.readable) {
@@ -74,12 +79,20 @@ void add_output(const Fitted& fitted, std::size_t p, std::size_t o, bool alone, 
                        "Bars: how far each input moves the prediction between its quartiles.")}});
     }
   }
-  Section shape{"What it says" + of, "The prediction along one input, with the others at their means."};
+  Section shape{
+      "What it says" + of,
+      "The mean prediction over the rows along one input, all others as they are. Thin: single rows. Dots at the "
+      "bottom: where rows lie. All pictures have one axis."};
+  std::vector<int> shown;
+  std::vector<Chart> slices;
   for (const int j : order) {
-    if (shape.blocks.size() == 6) break;
-    if (model.inputs()[j].low < model.inputs()[j].high || model.inputs()[j].is_categorical())
-      shape.blocks.push_back(block(slice(fitted, output, j)));
+    if (slices.size() == 6) break;
+    if (!(model.inputs()[j].low < model.inputs()[j].high || model.inputs()[j].is_categorical())) continue;
+    shown.push_back(j);
+    slices.push_back(slice(fitted, output, j));
   }
+  on_one_axis(fitted, shown, slices);
+  for (const Chart& chart : slices) shape.blocks.push_back(block(chart));
   for (Json& picture : plane_blocks(model, output, fitted.inputs, fitted.outputs.col(output)))
     shape.blocks.push_back(std::move(picture));
   if (!order.empty()) shape.blocks.push_back(block(waterfall(fitted, output)));

@@ -11,7 +11,7 @@ function points(layer, shade) {
 
 const line = (layer, shade) => [{
   type: "scatter", mode: "lines",
-  line: { color: shade, width: layer.dash ? 1.6 : 2.2, dash: layer.dash ? "dash" : "solid", shape: layer.steps ? "hv" : "linear" },
+  line: { color: shade, width: layer.size ?? (layer.dash ? 1.6 : 2.2), dash: layer.dash ? "dash" : "solid", shape: layer.steps ? "hv" : "linear" },
 }];
 
 function bars(layer, shade, overlay) {

@@ -10,9 +10,9 @@ function spaceAxis(description) {
 
 function space(block, extra = {}) {
   return layout({ height: window.innerWidth < 600 ? 360 : 520, ...block }, {
-    margin: { l: 0, r: 0, t: 0, b: 0 },
+    margin: { l: 8, r: 8, t: 8, b: 32 }, // room for the titles of the axes
     scene: { xaxis: spaceAxis(block.x), yaxis: spaceAxis(block.y), zaxis: spaceAxis(block.z_axis),
-      camera: { eye: { x: 1.5, y: -1.5, z: 0.9 } }, dragmode: "turntable", ...extra },
+      camera: { eye: { x: 1.65, y: -1.65, z: 1 } }, dragmode: "turntable", ...extra },
   });
 }
 

@@ -31,6 +31,7 @@
 #include "llmt/options.hpp"
 #include "llmt/outliers.hpp"
 #include "llmt/partition.hpp"
+#include "llmt/permutation_importance.hpp"
 #include "llmt/progress.hpp"
 #include "llmt/random.hpp"
 #include "llmt/readable.hpp"
