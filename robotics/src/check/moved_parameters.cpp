@@ -6,6 +6,7 @@
 
 #include "calibration/free_parameters.hpp"
 #include "check/f_tail.hpp"
+#include "check/shared_error.hpp"
 #include "llmt/robotics/effects.hpp"
 
 namespace llmt::robotics {
@@ -84,6 +85,13 @@ Eigen::MatrixXd covariance_of(const Robot& robot, const std::vector<discovery::P
   return covariance;
 }
 
+// The noise of a coordinate at the calibration. Readings that lay far off do not count in the error on poses left out.
+double noise_of(const CalibrationRecord& record) {
+  constexpr double mean_length = 1.595769;  // of normal noise in three coordinates
+  if (!record.held_out_mm || record.coordinates < 3 * record.poses) return record.noise_mm;
+  return std::min(record.noise_mm, *record.held_out_mm / mean_length);
+}
+
 double mean_of_poses(const Eigen::VectorXd& stacked, const std::vector<Eigen::Index>& rows, Eigen::Index poses) {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(poses);
   for (Eigen::Index i = 0; i < stacked.size(); ++i) squares(rows[i] / 3) += stacked(i) * stacked(i);
@@ -127,6 +135,13 @@ void find_moved(const CorrectedRobot& robot, const Robot& before, const Measurem
   problem.level = options.level;
   problem.covariance = covariance_of(robot.robot, parameters, problem.nuisance);
   problem.suspects = suspects_of(parameters, geometric, options.same_session);
+  const auto [noise, freedom] = unexplained(problem.jacobian, problem.residuals);
+  const double known_noise = robot.robot.calibration ? noise_of(*robot.robot.calibration) : 0.0;
+  const PointRows points = point_rows(robot.robot.chain, measurements, rows);
+  const SharedError shared = likeliest_shared_error(points, problem.jacobian, problem.residuals, known_noise);
+  problem.least_noise = shared.sigma;
+  problem.jacobian = whitened(shared, points, std::move(problem.jacobian));
+  problem.residuals = whitened(shared, points, problem.residuals);
   const Movements movements = find_movements(problem);
   for (const Movement& movement : movements.found) {
     const Suspect& suspect = problem.suspects[movement.suspect];
@@ -141,17 +156,17 @@ void find_moved(const CorrectedRobot& robot, const Robot& before, const Measurem
   }
   for (const std::size_t unseen : movements.unseen) result.unseen.push_back(problem.suspects[unseen].name);
   result.tested = std::ssize(problem.suspects) - std::ssize(movements.unseen);
-  result.noise_mm = movements.noise;
-  result.refitted_mm = mean_of_poses(movements.left, rows, measurements.count());
+  result.noise_mm = noise;
+  result.refitted_mm = mean_of_poses(coloured(shared, points, movements.left), rows, measurements.count());
   if (!robot.robot.calibration) return;
   const CalibrationRecord& record = *robot.robot.calibration;
   result.noise_before_mm = record.noise_mm;
   const double known = static_cast<double>(record.coordinates - record.correlations.rows());
-  if (!(movements.freedom > 0.0 && known > 0.0 && record.noise_mm > 0.0)) return;
+  if (!(freedom > 0.0 && known > 0.0 && record.noise_mm > 0.0)) return;
   constexpr double rare = 0.01;
   constexpr double material = 1.33;
-  const double ratio = movements.noise / record.noise_mm;
-  result.unexplained = ratio > material && f_tail(ratio * ratio, movements.freedom, known) < rare;
+  const double ratio = noise / record.noise_mm;
+  result.unexplained = ratio > material && f_tail(ratio * ratio, freedom, known) < rare;
 }
 
 }  // namespace llmt::robotics

@@ -11,18 +11,6 @@
 namespace llmt::robotics {
 namespace {
 
-// The noise that no change of any parameter explains.
-void estimate_noise(const MovementProblem& problem, Movements& result) {
-  Eigen::MatrixXd columns = problem.jacobian;
-  for (auto column : columns.colwise()) column.stableNormalize();
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(columns);
-  factors.setThreshold(1e-7);
-  const Eigen::VectorXd rotated = factors.householderQ().adjoint() * problem.residuals;
-  const Eigen::Index freedom = rotated.size() - factors.rank();
-  result.freedom = static_cast<double>(freedom);
-  if (freedom > 0) result.noise = rotated.tail(freedom).norm() / std::sqrt(result.freedom);
-}
-
 // L with L L' the covariance.
 Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
@@ -119,14 +107,26 @@ void estimate(const MovementProblem& problem, const Normal& normal, Movements& r
 
 }  // namespace
 
+Unexplained unexplained(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residuals) {
+  Eigen::MatrixXd columns = jacobian;
+  for (auto column : columns.colwise()) column.stableNormalize();
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(columns);
+  factors.setThreshold(1e-7);
+  const Eigen::VectorXd rotated = factors.householderQ().adjoint() * residuals;
+  const Eigen::Index freedom = rotated.size() - factors.rank();
+  Unexplained result{.noise = 0.0, .freedom = static_cast<double>(freedom)};
+  if (freedom > 0) result.noise = rotated.tail(freedom).norm() / std::sqrt(result.freedom);
+  return result;
+}
+
 Movements find_movements(const MovementProblem& problem) {
   Movements result;
-  estimate_noise(problem, result);
+  const auto [noise, freedom_behind] = unexplained(problem.jacobian, problem.residuals);
   result.left = problem.residuals;
-  if (!(result.freedom > 0.0)) return result;
+  if (!(freedom_behind > 0.0)) return result;
   // Exact data: the rounding of positions of metres, mm.
-  constexpr double least_noise = 1e-9;
-  const Normal normal = normal_of(problem, std::max(least_noise, result.noise));
+  constexpr double rounding = 1e-9;
+  const Normal normal = normal_of(problem, std::max({rounding, problem.least_noise, noise}));
   std::vector<Eigen::Index> fitted = problem.nuisance;
   const auto count = static_cast<double>(problem.residuals.size());
   std::vector<std::size_t> left;
@@ -145,7 +145,7 @@ Movements find_movements(const MovementProblem& problem) {
       gains.push_back(gain);
       if (gain.freedom == 0) continue;
       const auto freedom = static_cast<double>(gain.freedom);
-      const double probability = (tests - done) * f_tail(gain.chi_square / freedom, freedom, result.freedom);
+      const double probability = (tests - done) * f_tail(gain.chi_square / freedom, freedom, freedom_behind);
       const double score = gain.chi_square - freedom * std::log(count);
       if (probability < problem.level && (!is_found || score > best_score)) {
         is_found = true;

@@ -22,6 +22,7 @@ struct MovementProblem {
   Eigen::MatrixXd covariance;          ///< K x K, of the calibrated values over their scales; 0 where they are exact
   std::vector<Suspect> suspects;
   double level = 0.05;
+  double least_noise = 0.0;  ///< what is left may be smaller by chance, the noise is not
 };
 
 struct Movement {
@@ -32,11 +33,16 @@ struct Movement {
   std::vector<std::size_t> or_else;
 };
 
+/// What no change of any parameter explains.
+struct Unexplained {
+  double noise = 0.0;    ///< standard deviation of a residual
+  double freedom = 0.0;  ///< degrees of freedom behind it
+};
+Unexplained unexplained(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residuals);
+
 struct Movements {
   std::vector<Movement> found;
   std::vector<std::size_t> unseen;
-  double noise = 0.0;    ///< standard deviation of a residual
-  double freedom = 0.0;  ///< degrees of freedom behind it
   Eigen::VectorXd left;  ///< residuals after nuisance and what moved
 };
 

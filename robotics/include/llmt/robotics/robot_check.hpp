@@ -101,11 +101,14 @@ struct RobotCheck : CheckedError {
 /// What moved. To first order the residuals are J_s s + J (d - d_0) + noise: s the base (nothing in the same session),
 /// d_0 the error of the calibrated parameters, whose covariance the description has, d their change. Every parameter
 /// that was identified, or fixed because it is a combination of others, every effect, the tool and the base are tested
-/// by generalised least squares with an F test, the noise being what no change of any parameter explains. The level is
-/// divided by the number of tests (Bonferroni); the most probable one by BIC is taken for moved, fitted from then on,
-/// and the rest tested again, until none passes: Holm's order. Whatever explains the residuals as well, up to 3.84 in
-/// chi square, is listed beside it. Joint maps are not tested. A tool of another session counts as moved if it is not
-/// where it was.
+/// by generalised least squares with an F test, the noise being what no change of any parameter explains, but no less
+/// than at calibration. A model that lacks something errs alike at like poses, which would look like a change:
+/// residuals of points may correlate by share exp(-d / range), d the distance of the joint values, in so far as they
+/// scatter less, with all parameters free, than at calibration (restricted maximum likelihood, Patterson and Thompson
+/// 1971). The level is divided by the number of tests (Bonferroni); the most probable one by BIC is taken for moved,
+/// fitted from then on, and the rest tested again, until none passes: Holm's order. Whatever explains the residuals as
+/// well, up to 3.84 in chi square, is listed beside it. Joint maps are not tested. A tool of another session counts as
+/// moved if it is not where it was.
 ///
 /// Where it was calibrated. A calibration knows nothing of joint values beyond those that it saw: there, what it could
 /// not determine looks like a change. Poses with a joint a tenth of its calibrated range or more beyond it are listed,
