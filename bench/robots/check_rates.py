@@ -5,9 +5,9 @@
         --measured ur10_b.csv
 
 Without a file each draw simulates a calibration of 120 poses and a check of 20 others, with the instrument set up anew:
-nothing changed; gross errors in the file of the calibration or in that of the check; each joint but the first knocked by
-0.01 to 0.05 degrees; and an arm that bends although its description does not, checked in a small part of its workspace.
-A knock of the first joint is the same as another base. With a measured file of one arm each draw calibrates to 200 of
+nothing changed; gross errors in the file of the calibration or in that of the check; each joint but the first knocked
+by 0.01 to 0.05 degrees; and an arm that bends although its description does not, checked in a small part of its
+workspace. A knock of the first joint is the same as another base. With a measured file of one arm each draw calibrates to 200 of
 its rows and checks with 60 others: spread over the file, or one after the other as they stand there.
 """
 
@@ -110,8 +110,8 @@ def simulated(judge, description, draws):
         scenes["new gross"][verdict] += 1
         named["new gross"] += {bad["line"] for bad in answer["bad"]} == lines
         spoilt(measured, 3, [0.8, 1.0, 12.0], draw)
-        answer, verdict = judge.check(judge.calibrate(arm, measured), judge.simulate(elsewhere, 20, 40000 + draw, "new"))
-        scenes["old gross"][verdict] += 1
+        today = judge.simulate(elsewhere, 20, 40000 + draw, "new")
+        scenes["old gross"][judge.check(judge.calibrate(arm, measured), today)[1]] += 1
         measured = judge.simulate(bending, 300, 50000 + draw, "old")
         corner = json.loads(json.dumps(bending | {"base": elsewhere["base"]}))
         place = random.Random(draw)

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "llmt/robotics/chain.hpp"
-
 namespace llmt::robotics {
 namespace {
 
