@@ -22,6 +22,7 @@ struct ExportArguments {
   std::string robot;
   robotics::UrdfLinks links;
   std::string deltas_from;
+  std::string origins_of;
   std::string session;
   std::string target;
   std::string output;
@@ -69,12 +70,15 @@ void export_command(const ExportArguments& arguments) {
   robotics::CorrectedRobot whole =
       robotics::read_corrected_robot(arguments.robot, links_for(arguments.robot, arguments.links, {}));
   whole.robot.chain = robotics::in_session(std::move(whole.robot.chain), arguments.session, arguments.target);
+  const std::string& other = arguments.kinematics ? arguments.origins_of : arguments.deltas_from;
   std::optional<robotics::Chain> nominal;
-  if (!arguments.deltas_from.empty()) {
-    const robotics::UrdfLinks links = links_for(arguments.deltas_from, arguments.links, whole.robot);
-    nominal = robotics::read_robot(arguments.deltas_from, links).chain;
-  }
-  const std::string text = report::geometry_table(whole, nominal ? &*nominal : nullptr, arguments.zeros, warn_of);
+  if (!other.empty()) nominal = robotics::read_robot(other, links_for(other, arguments.links, whole.robot)).chain;
+  const robotics::Chain* given = nominal ? &*nominal : nullptr;
+  const std::string text = report::geometry_table(whole,
+                                                  {.deltas_from = arguments.kinematics ? nullptr : given,
+                                                   .zeros = arguments.zeros,
+                                                   .origins_of = arguments.kinematics ? given : nullptr},
+                                                  warn_of);
   if (arguments.output.empty()) {
     print_bytes(text);
   } else {
@@ -95,7 +99,11 @@ void add_robot_export(CLI::App& app) {
   command->add_flag("--c", arguments->c,
                     "C99 source: forward model with effects and correction, and a step of compensate");
   command->add_option("--name", arguments->name, "Begins all names in the C source")->capture_default_str();
-  command->add_flag("--kinematics", arguments->kinematics, "YAML with x, y, z, roll, pitch, yaw of each joint");
+  CLI::Option* kinematics =
+      command->add_flag("--kinematics", arguments->kinematics, "YAML with x, y, z, roll, pitch, yaw of each joint");
+  add_input_file(*command, "--origins", arguments->origins_of,
+                 "Names of the joints and places of their origins on the axes are those of this description")
+      ->needs(kinematics);
   add_input_file(*command, "--deltas", arguments->deltas_from,
                  "CSV with the differences of the parameters from those of this description");
   command

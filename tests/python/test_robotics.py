@@ -232,6 +232,11 @@ def test_export_is_that_of_the_command(arm):
             "export", "arm_true.yaml", "--deltas", "arm.yaml"
         )
     assert robotics.export(arm, "kinematics") == command("export", "arm.yaml", "--kinematics")
+    assert robotics.export(arm, "kinematics", origins=arm) == command(
+        "export", "arm.yaml", "--kinematics", "--origins", "arm.yaml"
+    )
+    with pytest.raises(ValueError, match="leave origins out"):
+        robotics.export(arm, "c", origins=arm)
     source, header = robotics.export(arm, "c", name="sample")
     assert "sample_forward" in source and "sample_forward" in header
 

@@ -299,14 +299,15 @@ nb::dict export_c(const Arm& arm, const std::string& name, const std::string& se
   return result;
 }
 
-// The geometry: differences from `nominal`, or poses of the joints without it.
-nb::dict export_geometry(const Arm& arm, const Arm* nominal, bool zeros, const std::string& session,
+// The geometry: differences from `nominal`, or poses of the joints, with origins like those of `origins`.
+nb::dict export_geometry(const Arm& arm, const Arm* nominal, const Arm* origins, bool zeros, const std::string& session,
                          const std::string& target) {
   Outcome outcome;
   robotics::CorrectedRobot robot = arm.robot;
   robot.robot.chain = robotics::in_session(std::move(robot.robot.chain), session, target);
-  const robotics::Chain* from = nominal != nullptr ? &nominal->robot.robot.chain : nullptr;
-  return outcome.dict(report::geometry_table(robot, from, zeros, outcome.warn()), nullptr);
+  const auto chain_of = [](const Arm* one) { return one != nullptr ? &one->robot.robot.chain : nullptr; };
+  return outcome.dict(report::geometry_table(robot, {chain_of(nominal), zeros, chain_of(origins)}, outcome.warn()),
+                      nullptr);
 }
 
 }  // namespace
@@ -332,8 +333,8 @@ void add_robot_tasks(nb::module_& module) {
              arg("noise_um"), arg("seed"));
   module.def("predict", &predict_poses, arg("robot"), arg("at"), arg("reading"), nb::kw_only(), arg("as_measured"));
   module.def("export_c", &export_c, arg("robot"), arg("name"), arg("session"), arg("target"));
-  module.def("export_geometry", &export_geometry, arg("robot"), arg("nominal").none(), arg("zeros"), arg("session"),
-             arg("target"));
+  module.def("export_geometry", &export_geometry, arg("robot"), arg("nominal").none(), arg("origins").none(),
+             arg("zeros"), arg("session"), arg("target"));
 }
 
 }  // namespace llmt::python

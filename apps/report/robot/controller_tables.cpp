@@ -30,6 +30,52 @@ Eigen::Isometry3d joint_frame(const robotics::Chain& chain, const robotics::Skel
   return frame;
 }
 
+struct ZeroFrames {
+  std::vector<Eigen::Isometry3d> joints;
+  Eigen::Isometry3d tool = Eigen::Isometry3d::Identity();
+};
+
+// In the frame of the base.
+ZeroFrames zero_frames(robotics::Chain chain) {
+  chain.base = {};
+  const robotics::Kinematics kinematics(chain);
+  const robotics::Skeleton zero = kinematics.skeleton(Eigen::VectorXd::Zero(std::ssize(chain.joints)));
+  ZeroFrames frames;
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) frames.joints.push_back(joint_frame(chain, zero, j));
+  frames.tool.linear() = zero.tool.rotation;
+  frames.tool.translation() = zero.tool.position_mm;
+  return frames;
+}
+
+// The frames of `chain` moved along and turned about their axes to those of `like`.
+std::vector<Eigen::Isometry3d> moved_to(const robotics::Chain& like, const robotics::Chain& chain) {
+  const auto require = [](bool holds, const std::string& what) {
+    if (!holds) throw std::invalid_argument("--origins: the two descriptions are not of one arm: " + what);
+  };
+  require(like.joints.size() == chain.joints.size(), "their numbers of joints differ");
+  const std::vector<Eigen::Isometry3d> there = zero_frames(like).joints;
+  std::vector<Eigen::Isometry3d> frames = zero_frames(chain).joints;
+  constexpr double farthest = 0.1;  // of the reach
+  constexpr double most_turned_deg = 10.0;
+  constexpr double degree = 0.017453292519943295;
+  for (std::size_t j = 0; j < frames.size(); ++j) {
+    const std::string& name = chain.joints[j].name;
+    require(like.joints[j].type == chain.joints[j].type, name + " turns in one and slides in the other");
+    const Eigen::Vector3d axis = frames[j].linear().col(2);
+    const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(there[j].linear().col(2), axis);
+    const double turned_deg = Eigen::AngleAxisd(turn).angle() / degree;
+    require(turned_deg < most_turned_deg, fmt::format("their axes of {} differ by {:.3g} deg", name, turned_deg));
+    Eigen::Vector3d to_origin = there[j].translation() - frames[j].translation();
+    if (like.joints[j].type == robotics::JointType::revolute) to_origin = axis * axis.dot(to_origin);
+    frames[j].translation() += to_origin;
+    frames[j].linear() = turn.toRotationMatrix() * there[j].linear();
+    const double off_mm = (frames[j].translation() - there[j].translation()).norm();
+    require(off_mm < farthest * robotics::reach_of(like),
+            fmt::format("the axis of {} passes {:.4g} mm from its origin in the other", name, off_mm));
+  }
+  return frames;
+}
+
 std::string origin_text(const std::string& name, const Eigen::Isometry3d& pose) {
   const Eigen::Vector3d rpy = robotics::roll_pitch_yaw(pose.linear());
   const Eigen::Vector3d xyz = 0.001 * pose.translation();
@@ -61,31 +107,26 @@ std::string loss_of(const robotics::CorrectedRobot& whole, const robotics::Robot
 
 }  // namespace
 
-std::string kinematics_yaml(const robotics::Chain& described) {
-  robotics::Chain chain = described;
-  chain.base = {};
-  const robotics::Kinematics kinematics(chain);
-  const robotics::Skeleton zero = kinematics.skeleton(Eigen::VectorXd::Zero(std::ssize(chain.joints)));
+std::string kinematics_yaml(const robotics::Chain& described, const robotics::Chain* origins_of) {
+  const ZeroFrames zero = zero_frames(described);
+  const std::vector<Eigen::Isometry3d> frames = origins_of != nullptr ? moved_to(*origins_of, described) : zero.joints;
   std::string text =
       "# Pose of each joint in the frame of the one before, the first in the base, at zero; m and rad; fixed-axis "
       "roll,\n"
       "# pitch, yaw as in URDF. Every axis is z. tool: in the frame of the last joint.\n";
-  for (const robotics::Joint& joint : chain.joints) {
+  for (const robotics::Joint& joint : described.joints) {
     if (!joint.mimic) continue;
     text += fmt::format("# {} has no drive: its value is {} times that of {}, plus {} {}.\n", joint.name,
                         joint.mimic->multiplier, joint.mimic->joint, joint.mimic->offset, robotics::limit_unit(joint));
   }
   text += "kinematics:\n";
   Eigen::Isometry3d before = Eigen::Isometry3d::Identity();
-  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
-    const Eigen::Isometry3d frame = joint_frame(chain, zero, j);
-    text += origin_text(chain.joints[j].name, before.inverse() * frame);
-    before = frame;
+  for (std::size_t j = 0; j < frames.size(); ++j) {
+    const robotics::Chain& named = origins_of != nullptr ? *origins_of : described;
+    text += origin_text(named.joints[j].name, before.inverse() * frames[j]);
+    before = frames[j];
   }
-  Eigen::Isometry3d tool = Eigen::Isometry3d::Identity();
-  tool.linear() = zero.tool.rotation;
-  tool.translation() = zero.tool.position_mm;
-  return text + origin_text("tool", before.inverse() * tool);
+  return text + origin_text("tool", before.inverse() * zero.tool);
 }
 
 std::string deltas_csv(const robotics::Chain& chain, const robotics::Chain& nominal) {
@@ -104,11 +145,11 @@ std::string deltas_csv(const robotics::Chain& chain, const robotics::Chain& nomi
   return text;
 }
 
-std::string geometry_table(const robotics::CorrectedRobot& robot, const robotics::Chain* nominal, bool zeros,
-                           const Warn& warn) {
+std::string geometry_table(const robotics::CorrectedRobot& robot, const GeometryChoice& choice, const Warn& warn) {
+  const auto [nominal, zeros, origins_of] = choice;
   robotics::Robot alone = robotics::geometry_alone(robot);
   if (zeros && nominal != nullptr) alone.chain = robotics::fitted_to_model(*nominal, robot, zeros_of(*nominal));
-  std::string text = nominal != nullptr ? deltas_csv(alone.chain, *nominal) : kinematics_yaml(alone.chain);
+  std::string text = nominal != nullptr ? deltas_csv(alone.chain, *nominal) : kinematics_yaml(alone.chain, origins_of);
   const bool has_more = !robot.robot.effects.empty() || robot.correction.has_value();
   if (has_more || zeros) warn(finding("rest_left_out", loss_of(robot, alone, zeros)));
   if (const std::string uncertain = uncertain_text(alone); !uncertain.empty()) {

@@ -451,6 +451,7 @@ def export(
     form: str,
     *,
     nominal: Any = None,
+    origins: Any = None,
     name: str = "robot",
     zeros: bool = False,
     session: str = "",
@@ -459,7 +460,8 @@ def export(
     """The arm for a controller: ``llmt-robot export``.
 
     ``form`` is ``"c"``: C99 source and header (two texts), whose names begin with ``name``; ``"kinematics"``: YAML with
-    the pose of each joint; or ``"deltas"``: CSV with the differences of the Denavit-Hartenberg parameters from those of
+    the pose of each joint, with the names and the places on the axes that the joints of the arm ``origins`` have, if
+    given; or ``"deltas"``: CSV with the differences of the Denavit-Hartenberg parameters from those of
     ``nominal``, with ``zeros`` of the joints' zeros alone. Where the robot has more than the table holds, that is fitted
     anew to the whole model, and a warning says how far the tool is off without the rest. ``session`` and ``target``:
     whose base and tool, where the robot was calibrated with several.
@@ -473,12 +475,19 @@ def export(
             if form == "deltas"
             else f"nominal is for the form 'deltas' alone, and form is {form!r}: leave nominal out"
         )
+    if origins is not None and form != "kinematics":
+        raise ValueError(f"origins is for the form 'kinematics' alone, and form is {form!r}: leave origins out")
     if zeros and form != "deltas":
         raise ValueError(f"zeros is for the form 'deltas' alone, and form is {form!r}: leave zeros out")
     if form == "c":
         made = _warned(_extension().export_c(arm._bound, name, str(session), str(target)))
         return made["source"], made["header"]
     made = _extension().export_geometry(
-        arm._bound, None if nominal is None else _robot_of(nominal)._bound, bool(zeros), str(session), str(target)
+        arm._bound,
+        None if nominal is None else _robot_of(nominal)._bound,
+        None if origins is None else _robot_of(origins)._bound,
+        bool(zeros),
+        str(session),
+        str(target),
     )
     return _warned(made)["text"]
