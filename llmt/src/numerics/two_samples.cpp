@@ -130,7 +130,7 @@ double same_share_probability(Eigen::Index found_in_one, Eigen::Index one, Eigen
   const Eigen::Index found = found_in_one + found_in_other;
   if (found == 0 || found == one + other || one == 0 || other == 0) return 1.0;
   const boost::math::hypergeometric_distribution<double> count(
-      static_cast<std::uint64_t>(found), static_cast<std::uint64_t>(other), static_cast<std::uint64_t>(one + other));
+      static_cast<unsigned>(found), static_cast<unsigned>(other), static_cast<unsigned>(one + other));
   const Eigen::Index least = std::max(Eigen::Index{0}, found - one);
   const double at_most = cdf(count, static_cast<double>(found_in_other));
   const double at_least =
