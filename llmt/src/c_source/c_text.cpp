@@ -19,9 +19,9 @@ bool begins_with_mark(std::string_view text) {
          lies("\xE2\x81\xA6", "\xE2\x81\xA9");
 }
 
-// Text that stands in a comment: no end of it, no line breaks, no marks of direction, with which a comment may look
-// like code and of which compilers warn.
-std::string commented(const std::string& text) {
+}  // namespace
+
+std::string c_comment(const std::string& text) {
   std::string safe;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char letter = text[i];
@@ -32,8 +32,6 @@ std::string commented(const std::string& text) {
   }
   return safe;
 }
-
-}  // namespace
 
 std::string Tables::number(double value) {
   if (std::isinf(value)) return value > 0.0 ? "HUGE_VAL" : "-HUGE_VAL";
@@ -83,19 +81,19 @@ std::string head_comment(const std::string& kind, const std::vector<InputColumn>
   std::string text = fmt::format("/* {}, written by llmt. int {}_predict(inputs, outputs)\n", kind, name);
   for (std::size_t j = 0; j < inputs.size(); ++j) {
     const InputColumn& input = inputs[j];
-    text += fmt::format("   inputs[{}]: {}", j, commented(input.name));
+    text += fmt::format("   inputs[{}]: {}", j, c_comment(input.name));
     for (std::size_t level = 0; level < input.levels.size(); ++level) {
       const bool is_empty = input.levels[level].empty() && level + 1 == input.levels.size();
       text += fmt::format("{} {} = {}", level == 0 ? "," : ";",
                           is_empty              ? "NaN"
                           : input.codes.empty() ? std::to_string(level)
                                                 : fmt::format("{}", input.codes[level]),
-                          is_empty ? "no value" : commented(input.levels[level]));
+                          is_empty ? "no value" : c_comment(input.levels[level]));
     }
     text += "\n";
   }
   for (std::size_t o = 0; o < outputs.size(); ++o) {
-    text += fmt::format("   outputs[{}]: {}\n", o, commented(outputs[o].name));
+    text += fmt::format("   outputs[{}]: {}\n", o, c_comment(outputs[o].name));
   }
   return text + "   A missing input is NaN. */\n";
 }

@@ -33,6 +33,10 @@ class Tables {
 /// The text with the name in place of every '@'.
 std::string with_name(std::string text, const std::string& name);
 
+/// Text that stands in a comment: no end of it, no line breaks, no marks of direction, with which a comment may look
+/// like code and of which compilers warn.
+std::string c_comment(const std::string& text);
+
 /// The comment at the head of a source and its header: what the model is, its inputs and outputs.
 std::string head_comment(const std::string& kind, const std::vector<InputColumn>& inputs,
                          const std::vector<OutputColumn>& outputs, const std::string& name);

@@ -167,7 +167,7 @@ void check_boosted_format(const JsonReader& root) {
 
 }  // namespace
 
-std::string to_json(const BoostedModel& model) {
+Json json_of(const BoostedModel& model) {
   Json json = {{"format", boosted_format_name}, {"version", boosted_format_version}};
   json["inputs"] = Json::array();
   for (std::size_t j = 0; j < model.inputs().size(); ++j) {
@@ -189,12 +189,12 @@ std::string to_json(const BoostedModel& model) {
   }
   if (!model.gaps().empty()) json["gaps"] = json_of(model.gaps());
   if (!model.record().empty()) json["training"] = json_of(model.record());
-  return compact_text(json);
+  return json;
 }
 
-BoostedModel boosted_from_json(const std::string& text, const std::string& name) {
-  const JsonDocument document = parse_json(text, name, most(Limit::model_values));
-  const JsonReader root(document.value(), name);
+std::string to_json(const BoostedModel& model) { return compact_text(json_of(model)); }
+
+BoostedModel boosted_model_from(const JsonReader& root) {
   check_boosted_format(root);
   std::vector<InputColumn> inputs;
   std::vector<double> deviations;
@@ -218,6 +218,11 @@ BoostedModel boosted_from_json(const std::string& text, const std::string& name)
   } catch (const std::invalid_argument& error) {
     root.member(root.has("training") && !root.has("gaps") ? "training" : "gaps").fail(error.what());
   }
+}
+
+BoostedModel boosted_from_json(const std::string& text, const std::string& name) {
+  const JsonDocument document = parse_json(text, name, most(Limit::model_values));
+  return boosted_model_from({document.value(), name});
 }
 
 void save(const BoostedModel& model, const std::string& path) { write_file(path, to_json(model)); }

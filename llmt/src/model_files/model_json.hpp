@@ -2,6 +2,7 @@
 /// A model as a JSON value: docs/file-formats.md.
 #pragma once
 
+#include "llmt/boosted_model.hpp"
 #include "llmt/model.hpp"
 #include "model_files/json_reader.hpp"
 
@@ -22,6 +23,10 @@ inline constexpr int model_format_version_with_empty_levels = 5;
 inline constexpr const char* boosted_format_name = "llmt-boosted-model";
 inline constexpr int boosted_format_version = 2;
 
+/// The format of models of systems that move, whose tree or sum of trees is a member.
+inline constexpr const char* dynamic_format_name = "llmt-dynamic-model";
+inline constexpr int dynamic_format_version = 1;
+
 /// The value that to_json() writes.
 Json json_of(const Model& model);
 
@@ -35,5 +40,12 @@ std::string compact_text(const Json& json);
 /// The model in a value, whatever other members it has. Throws std::runtime_error with the way to the part that cannot
 /// be accepted.
 Model model_from(const JsonReader& json);
+
+/// The same of sums of trees.
+Json json_of(const BoostedModel& model);
+BoostedModel boosted_model_from(const JsonReader& json);
+
+/// Whether a value says that it is a model of a system that moves.
+bool is_dynamic_model(const JsonReader& json);
 
 }  // namespace llmt

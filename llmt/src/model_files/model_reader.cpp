@@ -84,6 +84,7 @@ int check_format(const JsonReader& root) {
       root.member("format").as<std::string>() == boosted_format_name) {
     root.fail("a boosted model, the sum of many trees; one tree is needed here: fit without --boost");
   }
+  if (is_dynamic_model(root)) root.fail("a model of a system that moves; llmt simulate runs it, not llmt predict");
   if (!root.has("format") || root.member("format").as<std::string>() != model_format_name) {
     root.fail(fmt::format("not a model file: \"format\" is not \"{}\"", model_format_name));
   }
@@ -187,6 +188,11 @@ auto all_of(const JsonReader& array, const Read& read) {
 }
 
 }  // namespace
+
+bool is_dynamic_model(const JsonReader& json) {
+  return json.has("format") && json.member("format").is_text() &&
+         json.member("format").as<std::string>() == dynamic_format_name;
+}
 
 Model model_from(const JsonReader& root) {
   const int version = check_format(root);

@@ -1,0 +1,146 @@
+#include "llmt/fit_dynamic.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "dynamics/choice.hpp"
+#include "dynamics/model_structure.hpp"
+#include "dynamics/windows.hpp"
+
+namespace llmt {
+namespace {
+
+constexpr int estimate_iterations = 60;
+
+RunErrors errors_of(const Judged& judged, const Eigen::VectorXd& scale) {
+  RunErrors errors;
+  errors.rmse = (judged.squares / judged.rows).cwiseSqrt();
+  errors.fit = 100.0 * (1.0 - errors.rmse.array() / scale.array());
+  errors.rows = static_cast<Eigen::Index>(judged.rows);
+  errors.runs = judged.runs;
+  errors.diverged = judged.diverged;
+  return errors;
+}
+
+std::string continuation_of(const ModelStructure& candidate) {
+  if (candidate.degree == 0) return "guarded";
+  return candidate.degree > 1 && !candidate.is_held ? "polynomial" : "linear";
+}
+
+DynamicCandidate compared(const Task& task, const Trial& trial) {
+  DynamicCandidate result;
+  result.description = description_of(trial.candidate);
+  result.lags = trial.candidate.lags;
+  result.error = trial.error;
+  result.one_step = std::sqrt(trial.judged.one_step / (trial.judged.rows * static_cast<double>(task.outputs.size())));
+  result.is_linear = trial.candidate.is_linear();
+  result.is_stable = trial.judged.diverged == 0;
+  return result;
+}
+
+}  // namespace
+
+DynamicFit fit_dynamic(const Series& series, const DynamicOptions& options, const Progress& progress) {
+  check_series(series);
+  Work work(progress);
+  if (options.lags) {
+    check_lags(*options.lags);
+    if (std::ssize(options.lags->outputs) != series.outputs.cols() ||
+        std::ssize(options.lags->inputs) != series.inputs.cols()) {
+      throw std::invalid_argument("llmt::fit_dynamic: lags are needed for each output and input of the series");
+    }
+  }
+  if (options.horizon < 0) {
+    throw std::invalid_argument(fmt::format("llmt::fit_dynamic: the horizon is {}, it is 0 or more", options.horizon));
+  }
+  const Eigen::Index memory = options.lags ? longest_lag(*options.lags) : 0;
+  const std::vector<Stretch> stretches = complete_stretches(series, memory + 2);
+  Eigen::Index rows = 0;
+  for (const Stretch& stretch : stretches) rows += stretch.rows();
+  if (rows < std::max(fewest_dynamic_rows, 10 * memory)) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit_dynamic: {} complete rows in stretches longer than the lags, {} are needed", rows,
+                    std::max(fewest_dynamic_rows, 10 * memory)));
+  }
+  Task task = task_of(series, options);
+  for (std::size_t o = 0; o < task.outputs.size(); ++o) {
+    if (task.scale(static_cast<Eigen::Index>(o)) > 0.0) continue;
+    throw std::invalid_argument(
+        fmt::format("llmt::fit_dynamic: the output \"{}\" never changes", task.outputs[o].name));
+  }
+  Work choosing(work, 0.9);
+  const Chosen chosen = choose(task, stretches, options, choosing);
+  work.begin("estimating");
+  std::size_t taken = chosen.chosen;
+  DynamicParts parts = estimate(task, chosen.trials[taken].candidate, stretches, estimate_iterations);
+  Judged training = judge(task, parts, stretches);
+  // A model that does not even stay within its bounds over its own records gives way to the next best.
+  for (std::size_t k = 0; k < chosen.trials.size() && training.diverged > 0; ++k) {
+    if (chosen.trials[k].judged.diverged > 0) continue;
+    DynamicParts other = estimate(task, chosen.trials[k].candidate, stretches, estimate_iterations);
+    const Judged of_other = judge(task, other, stretches);
+    if (of_other.diverged > 0) continue;
+    taken = k;
+    parts = std::move(other);
+    training = of_other;
+  }
+  const Trial& best = chosen.trials[taken];
+  parts.is_stable = best.judged.diverged == 0 && training.diverged == 0;
+  DynamicFit fit{DynamicModel(std::move(parts)), {}, {}};
+  DynamicSummary& summary = fit.summary;
+  summary.rows = rows;
+  for (const Trial& trial : chosen.trials) summary.compared.push_back(compared(task, trial));
+  summary.chosen = taken;
+  summary.continuation = continuation_of(best.candidate);
+  summary.held_out = errors_of(best.judged, task.scale);
+  for (const Trial& trial : chosen.trials) {
+    if (!trial.candidate.is_linear()) continue;
+    summary.linear = errors_of(trial.judged, task.scale);
+    break;
+  }
+  summary.training = errors_of(training, task.scale);
+  fit.simulated.setConstant(series.rows(), series.outputs.cols(), std::nan(""));
+  const Eigen::VectorXd lower = lower_bounds(task.outputs);
+  const Eigen::VectorXd upper = upper_bounds(task.outputs);
+  Eigen::MatrixXd simulated;
+  for (const Window& window : windows_of(stretches, fit.model.memory(), options.horizon)) {
+    run_window(fit.model.parts(), series, window, lower, upper, simulated);
+    const Eigen::Index count = window.end - window.first;
+    fit.simulated.middleRows(window.first, count) = simulated.bottomRows(count);
+  }
+  work.finish();
+  return fit;
+}
+
+RunErrors run_errors(const DynamicModel& model, const Series& series, Eigen::Index initial, Eigen::Index horizon) {
+  check_series(series);
+  if (series.inputs.cols() != model.num_inputs() || series.outputs.cols() != model.num_outputs()) {
+    throw std::invalid_argument("llmt::run_errors: the series has other signals than the model");
+  }
+  const Eigen::Index given = std::max(initial, model.memory());
+  Task task = task_of(series, {});
+  Judged judged;
+  judged.squares.setZero(series.outputs.cols());
+  const Eigen::VectorXd lower = lower_bounds(model.parts().outputs);
+  const Eigen::VectorXd upper = upper_bounds(model.parts().outputs);
+  Eigen::MatrixXd simulated;
+  for (const Window& window : windows_of(complete_stretches(series, given + 1), given, horizon)) {
+    const Eigen::Index left = run_window(model.parts(), series, window, lower, upper, simulated);
+    ++judged.runs;
+    judged.diverged += left >= 0 ? 1 : 0;
+    for (Eigen::Index row = window.first; row < window.end; ++row) {
+      judged.rows += 1.0;
+      for (Eigen::Index o = 0; o < simulated.cols(); ++o) {
+        const double value = left >= 0 && row >= left ? upper(o) : simulated(row - window.begin, o);
+        judged.squares(o) += std::pow(series.outputs(row, o) - value, 2);
+      }
+    }
+  }
+  if (judged.runs == 0) throw std::invalid_argument("llmt::run_errors: no stretch of complete rows is long enough");
+  return errors_of(judged, task.scale);
+}
+
+}  // namespace llmt

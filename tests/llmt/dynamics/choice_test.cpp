@@ -1,0 +1,121 @@
+// What is chosen by runs over held-out stretches.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <stdexcept>
+
+#include "llmt/dynamic_analysis.hpp"
+#include "llmt/dynamics/systems.hpp"
+#include "llmt/fit_dynamic.hpp"
+
+namespace {
+
+using llmt::Series;
+
+const llmt::Lags of_second_order{{{1, 2}}, {{1}}};
+
+// A tank that overflows: the level is held, and falls again as soon as less flows in than out.
+TEST(DynamicChoice, AStopIsFoundAndHelps) {
+  const auto next = [](double y1, double y2, double u1) { return std::min(1.0, 1.7 * y1 - 0.72 * y2 + 0.03 * u1); };
+  const Series series = systems::record(600, 9, next, 0.0, 3.0);
+  ASSERT_GT((series.outputs.array() == 1.0).count(), 20);
+  llmt::DynamicOptions options;
+  options.lags = of_second_order;
+  options.rest = llmt::RestLearner::none;
+  const llmt::DynamicFit fit = llmt::fit_dynamic(series, options);
+  EXPECT_EQ(fit.model.parts().outputs[0].upper_stop, 1.0);
+  EXPECT_EQ(fit.model.parts().outputs[0].lower_stop, -std::numeric_limits<double>::infinity());
+}
+
+// Two outputs that drive each other, one record behind the other.
+TEST(DynamicChoice, OutputsAreInputsOfEachOther) {
+  llmt::Random random(10);
+  Series series;
+  series.input_names = {"u"};
+  series.output_names = {"p", "q"};
+  series.inputs.resize(400, 1);
+  series.outputs.resize(400, 2);
+  series.record_begins = {0, 250};
+  Eigen::Matrix2d a;
+  a << 0.9, 0.2, -0.3, 0.7;
+  Eigen::Vector2d y = Eigen::Vector2d::Zero();
+  double u = 0.0;
+  for (Eigen::Index row = 0; row < 400; ++row) {
+    if (row == 250) y.setConstant(1.0);
+    y = row == 0 || row == 250 ? y : Eigen::Vector2d(a * y + Eigen::Vector2d(0.0, 1.0) * u);
+    u = random.uniform(-1.0, 1.0);
+    series.outputs.row(row) = y.transpose();
+    series.inputs(row, 0) = u;
+  }
+  llmt::DynamicOptions options;
+  options.lags = llmt::Lags{{{1}, {1}}, {{1}}};
+  options.rest = llmt::RestLearner::none;
+  const llmt::DynamicFit fit = llmt::fit_dynamic(series, options);
+  EXPECT_LT(fit.summary.held_out.rmse.maxCoeff(), 1e-10);
+  const llmt::LocalDynamics local = llmt::local_dynamics(fit.model).front();
+  ASSERT_EQ(local.poles.size(), 2U);
+  // Eigenvalues of a: 0.8 +- i sqrt(0.06 - 0.01)
+  EXPECT_LT(std::abs(local.poles[0].z - std::complex<double>(0.8, std::sqrt(0.05))), 1e-9);
+  const Eigen::Vector2d gain = (Eigen::Matrix2d::Identity() - a).inverse() * Eigen::Vector2d(0.0, 1.0);
+  EXPECT_LT((local.steady_gain - gain).norm(), 1e-8);
+}
+
+TEST(DynamicChoice, ASpringThatStiffensIsFoundBeyondALinearModel) {
+  const Series series = systems::record(800, 11, systems::duffing, 0.02, 3.0);
+  llmt::DynamicOptions options;
+  options.lags = llmt::Lags{{{1, 2}}, {{1}}};
+  const llmt::DynamicFit fit = llmt::fit_dynamic(series, options);
+  // The noise of 0.02 is not predictable; the runs begin with two noisy rows.
+  EXPECT_LT(fit.summary.held_out.rmse(0), 0.03);
+  EXPECT_GT(fit.summary.linear.rmse(0), 4.0 * fit.summary.held_out.rmse(0));
+  EXPECT_TRUE(fit.model.parts().is_stable);
+  EXPECT_EQ(fit.summary.continuation, "polynomial");
+  const Series other = systems::record(800, 12, systems::duffing, 0.0, 3.0);
+  EXPECT_LT(llmt::run_errors(fit.model, other, 2).rmse(0), 0.03);
+}
+
+TEST(DynamicChoice, TheSameAtAnyNumberOfThreads) {
+  const Series series = systems::record(200, 13, systems::duffing, 0.05, 2.0);
+  llmt::DynamicOptions options;
+  options.lags = of_second_order;
+  options.max_threads = 1;
+  const std::string one = llmt::to_json(llmt::fit_dynamic(series, options).model);
+  options.max_threads = 3;
+  EXPECT_EQ(llmt::to_json(llmt::fit_dynamic(series, options).model), one);
+}
+
+TEST(DynamicChoice, SeriesFromWhichNothingCanBeLearnedAreRefused) {
+  const Series good = systems::record(200, 14, systems::oscillator);
+  const auto refused = [](Series series, const std::string& message) {
+    try {
+      llmt::fit_dynamic(series);
+      ADD_FAILURE() << message;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find(message), std::string::npos) << error.what();
+    }
+  };
+  Series series = good;
+  series.outputs.setConstant(2.0);
+  refused(series, "never changes");
+  series = good;
+  series.outputs(3, 0) = std::numeric_limits<double>::infinity();
+  refused(series, "outputs(3, 0) is inf");
+  series = good;
+  series.outputs.conservativeResize(20, 1);
+  series.inputs.conservativeResize(20, 1);
+  refused(series, "20 complete rows");
+  series = good;
+  series.input_names = {"y"};
+  refused(series, "two signals are \"y\"");
+  series = good;
+  series.record_begins = {0, 100, 50};
+  refused(series, "record_begins has 50");
+  series = good;
+  for (Eigen::Index row = 0; row < 200; row += 2) series.inputs(row, 0) = std::nan("");
+  refused(series, "0 complete rows");
+}
+
+}  // namespace
