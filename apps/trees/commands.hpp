@@ -11,6 +11,7 @@ inline constexpr const char* model_comes_first = "the model (JSON) comes first, 
 
 void add_fit(CLI::App& app);
 void add_predict(CLI::App& app);
+void add_simulate(CLI::App& app);
 void add_inspect(CLI::App& app);
 void add_explain(CLI::App& app);
 void add_check(CLI::App& app);

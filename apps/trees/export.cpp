@@ -6,6 +6,7 @@
 
 #include "llmt/boosted_model.hpp"
 #include "llmt/c_source.hpp"
+#include "llmt/dynamic_source.hpp"
 #include "llmt/files.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
@@ -45,6 +46,11 @@ void export_command(const ExportArguments& arguments) {
     write_source(arguments, model, to_c(model, arguments.name, include), header);
     return;
   }
+  if (is_dynamic_file(arguments.model)) {
+    const DynamicModel model = load_dynamic(arguments.model);
+    write_source(arguments, model, to_c(model, arguments.name, include), header);
+    return;
+  }
   const Model model = load_model(arguments.model);
   write_source(arguments, model, to_c(model, arguments.name, include), header);
 }
@@ -56,6 +62,8 @@ void add_export(CLI::App& app) {
                                          "Write a model as C source\n"
                                          "C99 without dependencies, memory allocation or recursion: int "
                                          "NAME_predict(const double *inputs, double *outputs). "
+                                         "Of a model of a system that moves: NAME_start and NAME_step, with its state "
+                                         "in a struct. "
                                          "Everything that llmt predict does is in it.");
   command->footer("Example: llmt export --c concrete.json -o concrete.c && cc -std=c99 -c concrete.c");
   const auto arguments = std::make_shared<ExportArguments>();

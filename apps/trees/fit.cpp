@@ -25,6 +25,7 @@
 #include "trees/arrow_fit.hpp"
 #include "trees/boost_command.hpp"
 #include "trees/commands.hpp"
+#include "trees/dynamic_fit.hpp"
 #include "trees/fit_options.hpp"
 #include "trees/gross_errors.hpp"
 #include "trees/learning.hpp"
@@ -41,6 +42,7 @@ struct FitArguments {
   bool boost = false;
   bool teach = false;
   ArrowFitArguments arrow;
+  DynamicArguments dynamic;
   std::string readable;  ///< the loss in per cent; empty: none is asked for
   ReportFiles reports;
 };
@@ -218,6 +220,7 @@ void add_fit(CLI::App& app) {
   command->add_flag("--boost", arguments->boost,
                     "A sum of many small trees, each fitted to what those before it leave: more accurate than one tree "
                     "as a rule, and nobody reads it");
+  add_dynamic_options(*command, arguments->dynamic);
   add_arrow_fit_options(*command, arguments->arrow);
   require_forms(*command);
   command->callback([command, arguments] {
@@ -237,6 +240,12 @@ void add_fit(CLI::App& app) {
                                               arguments->learning.data, option));
     }
     require_target(arguments->learning);
+    if (!arguments->dynamic.lags.empty()) {
+      dynamic_fit_command(*command, {arguments->learning, arguments->dynamic, arguments->output, arguments->json,
+                                     arguments->boost, !arguments->readable.empty()});
+      return;
+    }
+    refuse_dynamic_options(*command);
     if (arguments->stream) {
       stream_command(*command, {arguments->learning, arguments->output, arguments->json});
       return;

@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
   app.set_help_all_flag("--help-all", "Help with all options, also those for experts");
   llmt::apps::add_fit(app);
   llmt::apps::add_predict(app);
+  llmt::apps::add_simulate(app);
   llmt::apps::add_inspect(app);
   llmt::apps::add_explain(app);
   llmt::apps::add_check(app);

@@ -25,6 +25,16 @@ bool is_table(const std::string& path) {
   }
 }
 
+// Whether a JSON file names its format among its first letters.
+bool begins_with(const std::string& path, const char* format) {
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(path, unknown) || !is_json_file(path)) return false;
+  std::ifstream file(path, std::ios::binary);
+  std::string begin(200, ' ');
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return begin.find(format) != std::string::npos;
+}
+
 }  // namespace
 
 ModelWithIntervals load_model(const std::string& path, bool with_intervals) {
@@ -48,13 +58,8 @@ Eigen::VectorXd positive_weights(const Csv& csv, const std::string& column, int 
   return weights;
 }
 
-bool is_boosted_file(const std::string& path) {
-  std::error_code unknown;
-  if (!std::filesystem::is_regular_file(path, unknown) || !is_json_file(path)) return false;
-  std::ifstream file(path, std::ios::binary);
-  std::string begin(200, ' ');
-  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  return begin.find("\"llmt-boosted-model\"") != std::string::npos;
-}
+bool is_boosted_file(const std::string& path) { return begins_with(path, "\"llmt-boosted-model\""); }
+
+bool is_dynamic_file(const std::string& path) { return begins_with(path, "\"llmt-dynamic-model\""); }
 
 }  // namespace llmt::apps

@@ -23,4 +23,7 @@ Eigen::VectorXd positive_weights(const Csv& csv, const std::string& column, int 
 /// Whether the file begins as one that llmt fit --boost writes.
 bool is_boosted_file(const std::string& path);
 
+/// Whether the file begins as one that llmt fit --lags writes.
+bool is_dynamic_file(const std::string& path);
+
 }  // namespace llmt::apps
