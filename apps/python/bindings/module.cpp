@@ -33,6 +33,7 @@ NB_MODULE(_core, module) {
   llmt::python::add_models(module);
   llmt::python::add_boosted(module);
   llmt::python::add_distributed(module);
+  llmt::python::add_dynamics(module);
   llmt::python::add_fitting(module);
   llmt::python::add_found(module);
   llmt::python::add_options(module);

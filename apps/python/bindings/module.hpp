@@ -9,6 +9,7 @@ namespace llmt::python {
 void add_arrow(nanobind::module_& module);
 void add_boosted(nanobind::module_& module);
 void add_distributed(nanobind::module_& module);
+void add_dynamics(nanobind::module_& module);
 void add_fitting(nanobind::module_& module);
 void add_found(nanobind::module_& module);
 void add_models(nanobind::module_& module);

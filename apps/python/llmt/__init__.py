@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ._boosted import BoostedLocalLinearTreeRegressor as BoostedLocalLinearTreeRegressor
+    from ._dynamic import DynamicLocalLinearTreeRegressor as DynamicLocalLinearTreeRegressor
     from ._discover import Missing as Missing
     from ._discover import discover as discover
     from ._discover import find_missing as find_missing
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 _homes = {
     "BoostedLocalLinearTreeRegressor": "_boosted",
     "BoostedModel": "_model",
+    "DynamicLocalLinearTreeRegressor": "_dynamic",
     "Found": "_found",
     "LocalLinearTreeRegressor": "_estimator",
     "Missing": "_discover",
@@ -53,6 +55,7 @@ _homes = {
 __all__ = [
     "BoostedLocalLinearTreeRegressor",
     "BoostedModel",
+    "DynamicLocalLinearTreeRegressor",
     "Found",
     "LocalLinearTreeRegressor",
     "Missing",

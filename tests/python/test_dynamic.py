@@ -1,0 +1,100 @@
+"""Models of systems that move, beside the program and compiled C."""
+
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from llmt import DynamicLocalLinearTreeRegressor
+
+
+def spring(rows: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    source = np.random.default_rng(seed)
+    u = np.repeat(source.uniform(-3, 3, rows // 3 + 1), 3)[:rows]
+    y = np.zeros(rows)
+    for t in range(2, rows):
+        y[t] = 1.4 * y[t - 1] - 0.64 * y[t - 2] + 0.5 * u[t - 1] - 0.02 * y[t - 1] ** 3
+    return u, y + 0.01 * source.standard_normal(rows)
+
+
+def test_a_generated_silverbox_is_learned_and_run() -> None:
+    u, y = spring(600, 1)
+    model = DynamicLocalLinearTreeRegressor(lags="y:1-2,u:1").fit(u, y, dt=0.05)
+    other_u, other_y = spring(600, 2)
+    run = model.simulate(other_u, other_y[:2])[:, 0]
+    assert np.sqrt(np.mean((run - other_y) ** 2)) < 0.02
+    assert model.summary_["held_out"]["fit_per_cent"][0] > 98
+    assert model.sample_time_ == 0.05
+    assert model.is_stable_
+    assert all(abs(z) < 1 for poles in model.poles().values() for z in poles)
+    next_rows = model.predict(other_u, other_y)[:, 0]
+    assert np.isnan(next_rows[:2]).all()
+    assert np.sqrt(np.mean((next_rows[2:] - other_y[2:]) ** 2)) < 0.04
+    assert "Poles" in str(model) or "poles" in str(model) or "Local dynamics" in str(model)
+
+
+def test_files_and_c_run_to_the_same_bytes(tmp_path) -> None:
+    u, y = spring(300, 3)
+    model = DynamicLocalLinearTreeRegressor(lags="y:1-2,u:1", rest="hilomot").fit(u, y)
+    model.save(tmp_path / "m.json")
+    run = model.simulate(u, y[:2])
+    assert (DynamicLocalLinearTreeRegressor.load(tmp_path / "m.json").simulate(u, y[:2]) == run).all()
+    if shutil.which("cc") is None:
+        pytest.skip("no C compiler")
+    source, header = model.to_c("drive")
+    (tmp_path / "drive.c").write_text(source)
+    (tmp_path / "drive.h").write_text(header)
+    (tmp_path / "main.c").write_text(
+        """#include <stdio.h>
+#include "drive.h"
+int main(void) {
+  struct drive_state state;
+  double u[2], y[2], now, out;
+  int k;
+  for (k = 0; k < 2; ++k) if (scanf("%lf %lf", u + k, y + k) != 2) return 1;
+  drive_start(&state, 2, u, y);
+  while (scanf("%lf", &now) == 1) {
+    if (drive_step(&state, &now, &out) != 0) return 2;
+    printf("%.17g\\n", out);
+  }
+  return 0;
+}
+"""
+    )
+    subprocess.run("cc -std=c99 drive.c main.c -o drive -lm", shell=True, cwd=tmp_path, check=True)
+    given = "".join(f"{u[k]!r} {y[k]!r}\n" for k in range(2)) + "".join(f"{value!r}\n" for value in u[2:].tolist())
+    given = given.replace("np.float64(", "").replace(")", "")
+    done = subprocess.run([tmp_path / "drive"], input=given, capture_output=True, text=True, check=True)
+    assert (np.array([float(line) for line in done.stdout.split()]) == run[2:, 0]).all()
+
+
+def test_frames_give_names_and_the_step_of_time() -> None:
+    pandas = pytest.importorskip("pandas")
+    u, y = spring(300, 4)
+    index = pandas.date_range("2024-01-01", periods=300, freq="20ms")
+    frame = pandas.DataFrame({"force": u, "place": y}, index=index)
+    model = DynamicLocalLinearTreeRegressor(lags="place:1-2,force:1", rest="none").fit(frame[["force"]], frame["place"])
+    assert model.sample_time_ == pytest.approx(0.02)
+    assert model.lags_ == "place:1-2,force:1"
+    assert json.dumps(model.summary_["outputs"]) == '["place"]'
+    with pytest.raises(ValueError, match="row 10"):
+        DynamicLocalLinearTreeRegressor().fit(frame[["force"]].drop(index[10]), frame["place"].drop(index[10]))
+
+
+def test_what_does_not_fit_is_refused_by_name() -> None:
+    u, y = spring(100, 5)
+    with pytest.raises(ValueError, match="not fitted"):
+        DynamicLocalLinearTreeRegressor().simulate(u, y[:2])
+    with pytest.raises(ValueError, match="purpose"):
+        DynamicLocalLinearTreeRegressor(purpose="fun").fit(u, y)
+    with pytest.raises(ValueError, match="z:1"):
+        DynamicLocalLinearTreeRegressor(lags="z:1").fit(u, y)
+    with pytest.raises(ValueError, match="records has 3"):
+        DynamicLocalLinearTreeRegressor().fit(u, y, records=[1, 2, 3])
+    model = DynamicLocalLinearTreeRegressor(lags="y:1,u:1", rest="none").fit(u, y)
+    with pytest.raises(ValueError, match="to_onnx"):
+        model.to_onnx()
+    with pytest.raises(ValueError, match="to_sql"):
+        model.to_sql()
