@@ -86,6 +86,13 @@ void say_what_is_taken_as_missing(const std::vector<std::string>& names, const r
   }
 }
 
+// Whether an option of a column names an input, --monotone for example, perhaps with a sign.
+bool is_named(const LearningArguments& arguments, const std::string& name) {
+  return std::ranges::any_of(arguments.columns, [&](const auto& option) {
+    return contains(option.second, name) || contains(option.second, "-" + name);
+  });
+}
+
 // Says which columns are inputs although they look like names or numbers of the rows, or as if some of their numbers
 // were none. Returns those that are left out. Nothing is said of inputs that were asked for.
 std::vector<int> look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
@@ -111,7 +118,7 @@ std::vector<int> look_for_accidental_inputs(const LearningArguments& arguments, 
           name, found.detail));
       continue;
     }
-    if (found.is_left_out) {
+    if (found.is_left_out && !is_named(arguments, name)) {
       warn(
           fmt::format("llmt: column \"{}\" has {}, {} different ones in {} rows, and is left out; {}--categorical "
                       "takes it for categories",

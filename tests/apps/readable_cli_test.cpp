@@ -286,18 +286,10 @@ TEST(ReadableProgram, ThePriceIsSaidBesideTheChosenModel) {
   const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y --readable=200");
   const std::size_t begin = fitted.out.find("Reading costs ");
   ASSERT_NE(begin, std::string::npos) << fitted.out;
-  double cost = 0.0;
-  double low = 0.0;
-  double high = 0.0;
-  double readable = 0.0;
-  double chosen = 0.0;
-  ASSERT_EQ(
-      std::sscanf(fitted.out.c_str() + begin,
-                  "Reading costs %lf %% more error (over the folds %lf to %lf %%): RMSE held-out %lf in the place "
-                  "of %lf.",
-                  &cost, &low, &high, &readable, &chosen),
-      5)
-      << fitted.out;
+  double cost = 0.0, low = 0.0, high = 0.0, readable = 0.0, chosen = 0.0;
+  constexpr const char* sentence =
+      "Reading costs %lf %% more error (over the folds %lf to %lf %%): RMSE held-out %lf in the place of %lf.";
+  ASSERT_EQ(std::sscanf(fitted.out.c_str() + begin, sentence, &cost, &low, &high, &readable, &chosen), 5);
   EXPECT_NEAR(cost, 100.0 * (readable / chosen - 1.0), 0.6);
   EXPECT_LE(low, cost);
   EXPECT_GE(high, cost);

@@ -45,10 +45,10 @@ TEST(Names, ThatAreMisspeltAreGuessed) {
   folder.write("d.csv", small_table());
   EXPECT_EQ(refusal(folder, "fti d.csv"),
             "llmt: there is no command \"fti\" (did you mean \"fit\"?); the commands are fit, predict, inspect, "
-            "explain, compare, signals, table, discover, export\n");
+            "explain, check, compare, signals, table, discover, export\n");
   EXPECT_EQ(refusal(folder, ""),
-            "llmt: a command is needed: fit, predict, inspect, explain, compare, signals, table, discover, export; "
-            "llmt --help says what they do\n");
+            "llmt: a command is needed: fit, predict, inspect, explain, check, compare, signals, table, discover, "
+            "export; llmt --help says what they do\n");
   EXPECT_EQ(refusal(folder, "fit d.csv --traget y"),
             "llmt: there is no option --traget (did you mean \"--target\"?); llmt fit --help lists them\n");
   EXPECT_EQ(refusal(folder, "fit d.csv -t y --sooner"),
