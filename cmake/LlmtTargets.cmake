@@ -76,7 +76,7 @@ endfunction()
 
 # Eigen, fmt, GoogleTest and the standard library are most of what an average source compiles. With LLMT_PRECOMPILE_HEADERS they
 # are compiled once for all targets that share their flags. Each source includes what it uses all the same: the test
-# `consumer_sources` and the header sets are built without.
+# `consumer_sources`, the preset `dev` and the header sets are built without.
 
 # llmt_precompile(NAME HEADERS <header>... LIBS <target>...): a target that only compiles the headers. The caller gives it the
 # flags of those that reuse it.

@@ -1,7 +1,8 @@
 # cmake -D CASE=<case> -D ... -P check.cmake: one way of using llmt from another project, from a clean folder on.
 #   package   install all, then find_package(llmt COMPONENTS robotics), or the core where there is no robotics
 #   core      install the core only: it works, and asking it for robotics is refused in words
-#   sources   add_subdirectory: all of it is configured. Only the smallest library, llmt::discovery, is built anew
+#   sources   add_subdirectory: all of it is configured. What every library begins with and a user's source are compiled; a whole
+#             library would take minutes, and how one links is seen in `package`
 # SOURCE_DIR, BUILD_DIR: llmt's. WORK_DIR: where to work. ROBOTICS: ON where llmt::robotics was built. OPTIONS: for configuring.
 cmake_minimum_required(VERSION 3.25)
 
@@ -31,7 +32,7 @@ elseif(CASE STREQUAL "core")
   endif()
   file(REMOVE_RECURSE "${WORK_DIR}/build")
 elseif(CASE STREQUAL "sources")
-  # That it builds and runs is asked for, not how fast.
+  # That it compiles is asked for, not how fast it is.
   list(APPEND configure "-DLLMT_SOURCE_DIR=${SOURCE_DIR}" -DLLMT_UNITY_BUILD=ON -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0)
 else()
   message(FATAL_ERROR "unknown CASE '${CASE}'")
@@ -40,11 +41,15 @@ endif()
 run(${configure} "-DWITH_ROBOTICS=${ROBOTICS}")
 set(programs fit_and_predict solve)
 if(CASE STREQUAL "sources")
-  set(programs solve)
+  set(programs)
+  set(targets llmt_base CMakeFiles/solve.dir/solve.cpp.o)
 elseif(ROBOTICS)
   list(APPEND programs use_robotics calibrate_arm)
 endif()
-run("${CMAKE_COMMAND}" --build "${WORK_DIR}/build" --parallel 2 --target ${programs})
+if(NOT targets)
+  set(targets ${programs})
+endif()
+run("${CMAKE_COMMAND}" --build "${WORK_DIR}/build" --parallel 2 --target ${targets})
 foreach(program IN LISTS programs)
   run("${WORK_DIR}/build/${program}")
   message(STATUS "${program}: ${output}")
