@@ -43,12 +43,14 @@ std::size_t longest_line(const std::string& text) {
 TEST(Names, ThatAreMisspeltAreGuessed) {
   const Folder folder;
   folder.write("d.csv", small_table());
-  EXPECT_EQ(refusal(folder, "fti d.csv"),
-            "llmt: there is no command \"fti\" (did you mean \"fit\"?); the commands are fit, predict, inspect, "
-            "explain, check, compare, signals, table, discover, export\n");
-  EXPECT_EQ(refusal(folder, ""),
-            "llmt: a command is needed: fit, predict, inspect, explain, check, compare, signals, table, discover, "
-            "export; llmt --help says what they do\n");
+  EXPECT_EQ(
+      refusal(folder, "fti d.csv"),
+      "llmt: there is no command \"fti\" (did you mean \"fit\"?); the commands are fit, predict, simulate, inspect, "
+      "explain, check, compare, signals, table, discover, export\n");
+  EXPECT_EQ(
+      refusal(folder, ""),
+      "llmt: a command is needed: fit, predict, simulate, inspect, explain, check, compare, signals, table, discover, "
+      "export; llmt --help says what they do\n");
   EXPECT_EQ(refusal(folder, "fit d.csv --traget y"),
             "llmt: there is no option --traget (did you mean \"--target\"?); llmt fit --help lists them\n");
   EXPECT_EQ(refusal(folder, "fit d.csv -t y --sooner"),

@@ -5,6 +5,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import types
 
 import numpy as np
 import pytest
@@ -195,9 +196,14 @@ def test_a_regime_is_right_with_its_input_and_its_threshold():
     case = a_case(("linear", ("x",)), regime=("dx", 0.2), kind="regime")
     run = generate.run(case, 1)
     far = float(np.quantile(run.signals["dx"], 0.98))
-    said = lambda **more: verdicts.regime_right(case, answer(effect("linear", "x", **more)), run)
+    rows = types.SimpleNamespace(run=run, noise={"dx": 0.0})
+    said = lambda **more: verdicts.regime_right(case, answer(effect("linear", "x", **more)), rows)
     assert said(regime={"input": "dx", "threshold": 0.2}) and said(regime="dx > 0.2")
     assert not said(regime={"input": "x", "threshold": 0.2}) and not said()
+    assert not said(regime=f"dx > {far}")
+    rows.noise["dx"] = 0.35 * (far - 0.2)
+    assert said(regime=f"dx > {far}")
+    rows.noise["dx"] = 0.3 * (far - 0.2)
     assert not said(regime=f"dx > {far}")
 
 

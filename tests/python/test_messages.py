@@ -128,7 +128,7 @@ def test_the_model_in_use_is_the_chosen_one(table, readable):
 def test_both_errors_are_drawn(readable):
     pytest.importorskip("matplotlib").use("agg")
     labels = [text.get_text() for text in readable.plot_error().get_legend().get_texts()]
-    assert "this model, readable: 0.1008" in labels
+    assert "this model, readable: 0.1002" in labels
     assert "most accurate, with the spread of folds: 0.09045" in labels
 
 

@@ -201,6 +201,7 @@ std::vector<int> signs_of(const std::string& option, const std::vector<std::stri
 std::string far_value(const Eigen::Ref<const Eigen::VectorXd>& values) {
   constexpr Eigen::Index fewest = 3;
   constexpr Eigen::Index fewest_others = 10;
+  constexpr double far = 3.0;  // of the range of all others: designed settings, such as 0, 2.4 and 5, are not so far
   std::vector<double> sorted;
   for (const double value : values) {
     if (!std::isnan(value)) sorted.push_back(value);
@@ -216,7 +217,7 @@ std::string far_value(const Eigen::Ref<const Eigen::VectorXd>& values) {
     const double low = is_smallest ? *end : sorted.front();
     const double high = is_smallest ? sorted.back() : *(begin - 1);
     const double gap = is_smallest ? low - value : value - high;
-    if (high > low && gap > high - low) {
+    if (high > low && gap > far * (high - low)) {
       return fmt::format("{} of {} cells are {:.10g}, far from all others ({:.4g} to {:.4g})", equal, count, value, low,
                          high);
     }

@@ -149,7 +149,8 @@ Eigen::MatrixXi Model::leaf_of(const Inputs& inputs, int max_threads) const {
   for (std::size_t p = 0; p < partitions_.size(); ++p) {
     positions.push_back(leaf_positions(partitions_[p], leaves(p)));
   }
-  Eigen::MatrixXi result(inputs.rows(), std::ssize(partitions_));
+  // Far from all centres every Gaussian validity may be 0: such a row is of the first leaf.
+  Eigen::MatrixXi result = Eigen::MatrixXi::Zero(inputs.rows(), std::ssize(partitions_));
   for_each_block("llmt::Model::leaf_of", *this, depth_of(*evaluators_), inputs, max_threads,
                  [&](Eigen::Index begin, const RowBlock& block) {
                    for (std::size_t p = 0; p < partitions_.size(); ++p) {

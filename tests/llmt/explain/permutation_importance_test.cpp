@@ -10,15 +10,15 @@
 
 namespace {
 
-struct Rows {
+struct NoisyRows {
   Eigen::MatrixXd inputs;
   Eigen::MatrixXd outputs;
 };
 
 // y = 3 x0 + x1 + noise of 0.5; x2 is not there.
-Rows drawn(Eigen::Index count) {
+NoisyRows drawn(Eigen::Index count) {
   llmt::Random random(5);
-  Rows rows{Eigen::MatrixXd(count, 3), Eigen::MatrixXd(count, 1)};
+  NoisyRows rows{Eigen::MatrixXd(count, 3), Eigen::MatrixXd(count, 1)};
   for (Eigen::Index i = 0; i < count; ++i) {
     for (Eigen::Index j = 0; j < 3; ++j) rows.inputs(i, j) = random.normal();
     rows.outputs(i, 0) = 3.0 * rows.inputs(i, 0) + rows.inputs(i, 1) + 0.5 * random.normal();
@@ -26,14 +26,14 @@ Rows drawn(Eigen::Index count) {
   return rows;
 }
 
-llmt::PermutationImportance importance(const Rows& rows, const llmt::PermutationOptions& options = {}) {
+llmt::PermutationImportance importance(const NoisyRows& rows, const llmt::PermutationOptions& options = {}) {
   const llmt::FitResult fitted = llmt::fit(rows.inputs, rows.outputs, {.max_leaves = 1});
   return llmt::permutation_importance(fitted.intervals.models(), rows.inputs, rows.outputs, fitted.summary.held_out, {},
                                       options);
 }
 
 TEST(PermutationImportance, OfAnAffineModelIsThatOfTheSlopes) {
-  const Rows rows = drawn(1500);
+  const NoisyRows rows = drawn(1500);
   const llmt::PermutationImportance found = importance(rows);
   EXPECT_EQ(found.rows, 1500);
   EXPECT_NEAR(found.rmse(0), 0.5, 0.03);
@@ -47,7 +47,7 @@ TEST(PermutationImportance, OfAnAffineModelIsThatOfTheSlopes) {
 }
 
 TEST(PermutationImportance, DoesNotDependOnThreadsAndLooksAtFewRows) {
-  const Rows rows = drawn(400);
+  const NoisyRows rows = drawn(400);
   const llmt::PermutationImportance one = importance(rows, {.most_rows = 100, .max_threads = 1});
   const llmt::PermutationImportance two = importance(rows, {.most_rows = 100, .max_threads = 2});
   EXPECT_EQ(one.rows, 100);
@@ -57,7 +57,7 @@ TEST(PermutationImportance, DoesNotDependOnThreadsAndLooksAtFewRows) {
 }
 
 TEST(PermutationImportance, ARowOfWeightZeroDoesNotCount) {
-  Rows rows = drawn(200);
+  NoisyRows rows = drawn(200);
   const llmt::FitResult fitted = llmt::fit(rows.inputs, rows.outputs, {.max_leaves = 1});
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(200);
   weights(7) = 0.0;
@@ -68,7 +68,7 @@ TEST(PermutationImportance, ARowOfWeightZeroDoesNotCount) {
 }
 
 TEST(PermutationImportance, ArgumentsAreChecked) {
-  const Rows rows = drawn(60);
+  const NoisyRows rows = drawn(60);
   const llmt::FitResult fitted = llmt::fit(rows.inputs, rows.outputs, {.max_leaves = 1});
   const auto& models = fitted.intervals.models();
   const auto& held_out = fitted.summary.held_out;
