@@ -121,24 +121,9 @@ RunErrors run_errors(const DynamicModel& model, const Series& series, Eigen::Ind
     throw std::invalid_argument("llmt::run_errors: the series has other signals than the model");
   }
   const Eigen::Index given = std::max(initial, model.memory());
-  Task task = task_of(series, {});
-  Judged judged;
-  judged.squares.setZero(series.outputs.cols());
-  const Eigen::VectorXd lower = lower_bounds(model.parts().outputs);
-  const Eigen::VectorXd upper = upper_bounds(model.parts().outputs);
-  Eigen::MatrixXd simulated;
-  for (const Window& window : windows_of(complete_stretches(series, given + 1), given, horizon)) {
-    const Eigen::Index left = run_window(model.parts(), series, window, lower, upper, simulated);
-    ++judged.runs;
-    judged.diverged += left >= 0 ? 1 : 0;
-    for (Eigen::Index row = window.first; row < window.end; ++row) {
-      judged.rows += 1.0;
-      for (Eigen::Index o = 0; o < simulated.cols(); ++o) {
-        const double value = left >= 0 && row >= left ? upper(o) : simulated(row - window.begin, o);
-        judged.squares(o) += std::pow(series.outputs(row, o) - value, 2);
-      }
-    }
-  }
+  const Task task = task_of(series, {});
+  const Judged judged =
+      judge_runs(model.parts(), series, windows_of(complete_stretches(series, given + 1), given, horizon));
   if (judged.runs == 0) throw std::invalid_argument("llmt::run_errors: no stretch of complete rows is long enough");
   return errors_of(judged, task.scale);
 }

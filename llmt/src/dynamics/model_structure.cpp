@@ -235,15 +235,13 @@ Judged& Judged::operator+=(const Judged& other) {
   return *this;
 }
 
-Judged judge(const Task& task, const DynamicParts& parts, const std::vector<Stretch>& stretches) {
-  const Series& series = task.series;
+Judged judge_runs(const DynamicParts& parts, const Series& series, const std::vector<Window>& windows) {
   const Eigen::VectorXd lower = lower_bounds(parts.outputs);
   const Eigen::VectorXd upper = upper_bounds(parts.outputs);
   Judged judged;
   judged.squares.setZero(series.outputs.cols());
-  const Eigen::Index memory = longest_lag(parts.lags);
   Eigen::MatrixXd simulated;
-  for (const Window& window : windows_of(stretches, memory, task.horizon)) {
+  for (const Window& window : windows) {
     const Eigen::Index left = run_window(parts, series, window, lower, upper, simulated);
     ++judged.runs;
     judged.diverged += left >= 0 ? 1 : 0;
@@ -255,6 +253,13 @@ Judged judge(const Task& task, const DynamicParts& parts, const std::vector<Stre
       }
     }
   }
+  return judged;
+}
+
+Judged judge(const Task& task, const DynamicParts& parts, const std::vector<Stretch>& stretches) {
+  const Series& series = task.series;
+  const Eigen::Index memory = longest_lag(parts.lags);
+  Judged judged = judge_runs(parts, series, windows_of(stretches, memory, task.horizon));
   const RegressorRows rows = regressor_rows(series, parts.lags, stretches, memory);
   OneStep map(parts);
   Eigen::VectorXd x;

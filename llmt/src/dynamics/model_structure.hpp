@@ -65,6 +65,9 @@ struct Judged {
   Judged& operator+=(const Judged& other);
 };
 
+/// Runs over windows; a row from which on a run has left its bounds counts with the upper bound as its prediction.
+Judged judge_runs(const DynamicParts& parts, const Series& series, const std::vector<Window>& windows);
+
 /// Runs of the model over stretches, begun by its longest lag of measured rows.
 Judged judge(const Task& task, const DynamicParts& parts, const std::vector<Stretch>& stretches);
 
