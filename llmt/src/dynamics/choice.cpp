@@ -24,6 +24,10 @@ constexpr std::size_t kept_on_all_rows = 4;
 constexpr int most_delay = 10;
 // Candidates within this factor of the smallest error are as good on held-out stretches; there, amplitudes decide.
 constexpr double as_good = 1.05;
+// A linear model of an output that adds up runs as well without its value. In 400 rows of five systems each with a pole
+// at 1 the ratio of errors was 0.6 to 1.22, at 0.998 (slower than the record is long) 0.9 to 1.7, at 0.995 1.25 to 4.3,
+// at 0.99 3.5 to 13.
+constexpr double as_good_without_value = 1.25;
 
 void sort_by_error(std::vector<Trial>& trials) {
   std::ranges::stable_sort(trials, {}, [](const Trial& trial) {
@@ -97,6 +101,35 @@ bool take_stops(Task& task, const std::vector<Stretch>& stretches, const std::ve
   }
   try_on(task, folds, search_iterations, trials, work);
   return trials[1].error * as_good < trials[0].error;
+}
+
+// The lags of a system some of whose outputs add up their changes.
+Lags with_sums(Lags lags, const std::vector<bool>& adds_up) {
+  lags.adds_up.clear();
+  for (std::size_t o = 0; o < adds_up.size(); ++o) {
+    if (!adds_up[o] || lags.outputs[o].empty() || lags.outputs[o].front() != 1) continue;
+    lags.adds_up.resize(adds_up.size());
+    lags.adds_up[o] = true;
+  }
+  if (columns_of(lags).empty()) lags.adds_up.clear();
+  return lags;
+}
+
+// Which outputs add up their changes: those of which a linear model without their values runs as well.
+std::vector<bool> find_sums(const Task& task, const std::vector<StretchFold>& folds, Work& work) {
+  std::vector<bool> adds_up(task.outputs.size(), false);
+  const Lags lags = simple_lags(std::vector<int>(task.inputs.size(), 0), std::ssize(task.outputs), 2, 2);
+  for (std::size_t o = 0; o < adds_up.size(); ++o) {
+    std::vector<Trial> trials;
+    for (const bool tried : {false, true}) {
+      adds_up[o] = tried;
+      trials.push_back({{.lags = with_sums(lags, adds_up), .on_runs = true}});
+    }
+    Work part(work, 1.0 / static_cast<double>(adds_up.size()));
+    try_on(task, folds, search_iterations, trials, part);
+    adds_up[o] = trials[1].judged.diverged == 0 && trials[1].error <= as_good_without_value * trials[0].error;
+  }
+  return adds_up;
 }
 
 void reset(std::vector<Trial>& trials) {
@@ -186,7 +219,11 @@ Chosen choose(Task& task, const std::vector<Stretch>& stretches, const DynamicOp
     lags = {*options.lags};
   } else {
     Work finding(work, 0.1);
-    const std::vector<int> delays = find_delays(task, folds, task.horizon != 1, finding);
+    Work summing(finding, 0.2);
+    Work delaying(finding, 0.8);
+    std::vector<bool> sums;
+    if (task.horizon != 1) sums = find_sums(task, folds, summing);
+    const std::vector<int> delays = find_delays(task, folds, task.horizon != 1, delaying);
     lags = lag_candidates(delays, std::ssize(task.outputs), rows);
     // A linear model finds no delay where the system is far from linear: one row at most is tried too.
     std::vector<int> short_delays = delays;
@@ -194,6 +231,7 @@ Chosen choose(Task& task, const std::vector<Stretch>& stretches, const DynamicOp
     if (short_delays != delays) {
       for (Lags& tried : lag_candidates(short_delays, std::ssize(task.outputs), rows)) lags.push_back(std::move(tried));
     }
+    for (Lags& tried : lags) tried = with_sums(std::move(tried), sums);
     std::vector<ModelStructure> candidates;
     for (const Lags& tried : lags) {
       for (ModelStructure& candidate : probes(tried, options, rows)) candidates.push_back(std::move(candidate));

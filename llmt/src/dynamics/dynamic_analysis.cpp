@@ -121,7 +121,7 @@ Eigen::MatrixXd next_rows(const DynamicModel& model, const Series& series) {
   for (Eigen::Index k = 0; k < std::ssize(rows.rows); ++k) {
     x = rows.regressors.row(k).transpose();
     map.values(x.data(), y.data());
-    predicted.row(rows.rows[k]) = y.transpose();
+    predicted.row(rows.rows[k]) = y.transpose() + rows.last.row(k);
   }
   return predicted;
 }
@@ -156,6 +156,11 @@ LocalDynamics dynamics_at(const DynamicModel& model, const Eigen::VectorXd& regr
     } else {
       of_outputs.col(column.signal) += slope;
     }
+  }
+  for (Eigen::Index o = 0; o < outputs; ++o) {
+    if (!adds_up(model.parts().lags, o)) continue;
+    companion(o, o) += 1.0;
+    of_outputs(o, o) += 1.0;
   }
   companion.bottomLeftCorner(outputs * (memory - 1), outputs * (memory - 1)).setIdentity();
   LocalDynamics local{std::move(where), {}, {}, true};
@@ -198,7 +203,8 @@ std::vector<LocalDynamics> local_dynamics(const DynamicModel& model) {
   const bool is_linear = std::holds_alternative<std::monostate>(parts.rest) &&
                          std::ranges::all_of(parts.polynomial.terms, [](const auto& term) { return term.size() < 2; });
   const Signal& first = parts.outputs.front();
-  if (is_linear) return {dynamics_at(model, at_rest(model, 0.5 * (first.low + first.high)), "everywhere")};
+  if (is_linear || adds_up(parts.lags, 0))
+    return {dynamics_at(model, at_rest(model, 0.5 * (first.low + first.high)), "everywhere")};
   for (const double value : {first.low, 0.5 * (first.low + first.high), first.high}) {
     all.push_back(dynamics_at(model, at_rest(model, value), fmt::format("{} = {:.4g}", first.name, value)));
   }

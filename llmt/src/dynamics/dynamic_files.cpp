@@ -16,10 +16,13 @@ constexpr const char* stable = "stable";
 constexpr const char* unstable = "unstable";
 constexpr const char* goes_on = "polynomial";
 constexpr const char* held = "linear";
+constexpr const char* change = "change";
+constexpr const char* value = "value";
 
-Json json_of(const Signal& signal, const std::vector<int>& lags) {
+Json json_of(const Signal& signal, const std::vector<int>& lags, bool adds_up = false) {
   Json json = {
       {"name", signal.name}, {"unit", signal.unit}, {"low", signal.low}, {"high", signal.high}, {"lags", lags}};
+  if (adds_up) json["predicted"] = change;
   if (std::isfinite(signal.lower_stop)) json["lower_stop"] = signal.lower_stop;
   if (std::isfinite(signal.upper_stop)) json["upper_stop"] = signal.upper_stop;
   return json;
@@ -111,6 +114,9 @@ DynamicModel dynamic_from(const JsonReader& root) {
   }
   for (const JsonReader& output : root.member("outputs").elements()) {
     parts.outputs.push_back(signal_from(output, true, parts.lags.outputs));
+    if (!output.has("predicted") || !is_first(output.member("predicted"), change, value)) continue;
+    parts.lags.adds_up.resize(root.member("outputs").elements().size());
+    parts.lags.adds_up[parts.outputs.size() - 1] = true;
   }
   parts.polynomial = polynomial_from(root.member("polynomial"), std::ssize(parts.outputs));
   if (root.has("tree") && root.has("sum")) root.fail("a model has a tree or a sum of trees, not both");
@@ -138,7 +144,8 @@ std::string to_json(const DynamicModel& model) {
   }
   json["outputs"] = Json::array();
   for (std::size_t o = 0; o < parts.outputs.size(); ++o) {
-    json["outputs"].push_back(json_of(parts.outputs[o], parts.lags.outputs[o]));
+    json["outputs"].push_back(
+        json_of(parts.outputs[o], parts.lags.outputs[o], adds_up(parts.lags, static_cast<Eigen::Index>(o))));
   }
   json["polynomial"] =
       json_of(parts.polynomial, column_names(model.columns(), names_in(parts.inputs), names_in(parts.outputs)));

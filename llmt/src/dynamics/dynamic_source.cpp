@@ -106,7 +106,7 @@ int @_step(struct @_state *state, const double *inputs, double *outputs) {
     if (x[k] - x[k] != 0.0) return 1;
   }
   @_polynomial(x, y);
-%REST%  for (k = 0; k < @_SYSTEM_OUTPUTS; ++k) {
+%REST%%LAST%  for (k = 0; k < @_SYSTEM_OUTPUTS; ++k) {
     if (y[k] - y[k] != 0.0) return 1;
   }
   for (row = 0; row + 1 < @_MEMORY; ++row) {
@@ -135,6 +135,11 @@ const char* const rest_step = R"(  {
     double rest[@_SYSTEM_OUTPUTS];
     if (@_predict(x, rest) != 0) return 1;
     for (k = 0; k < @_SYSTEM_OUTPUTS; ++k) y[k] += rest[k];
+  }
+)";
+
+const char* const last_step = R"(  for (k = 0; k < @_SYSTEM_OUTPUTS; ++k) {
+    if (@_adds_up[k] != 0) y[k] += state->held[@_MEMORY - 1][k];
   }
 )";
 
@@ -174,6 +179,8 @@ void add_tables(Tables& tables, const DynamicModel& model, const std::string& na
   std::vector<double> stops;
   for (const Signal& output : model.parts().outputs) stops.insert(stops.end(), {output.lower_stop, output.upper_stop});
   tables.add("stops", stops);
+  const std::vector<bool>& adds_up = model.parts().lags.adds_up;
+  if (!adds_up.empty()) tables.add("adds_up", std::vector<int>(adds_up.begin(), adds_up.end()));
 }
 
 }  // namespace
@@ -209,8 +216,9 @@ CSource to_c(const DynamicModel& model, const std::string& name, const std::stri
   const std::string private_sizes =
       fmt::format("\nenum {{ @_COLUMNS = {}, @_TERMS = {}, @_IS_HELD = {} }};\n", model.columns().size(),
                   parts.polynomial.terms.size(), parts.polynomial.is_held ? 1 : 0);
-  result.source += with_name(private_sizes + types, name) + tables.text() +
-                   with_name(replaced_once(runtime, "%REST%", has_rest ? rest_step : ""), name);
+  std::string steps = replaced_once(runtime, "%REST%", has_rest ? rest_step : "");
+  steps = replaced_once(std::move(steps), "%LAST%", parts.lags.adds_up.empty() ? "" : last_step);
+  result.source += with_name(private_sizes + types, name) + tables.text() + with_name(steps, name);
   return result;
 }
 

@@ -24,11 +24,11 @@ int lag_from(std::string_view text, std::string_view part) {
 }
 
 // "1,2,3,5" as "1-3,5" with the name before each.
-void append_lags(std::string& text, const std::string& name, const std::vector<int>& lags) {
+void append_lags(std::string& text, const std::string& name, const std::vector<int>& lags, bool adds_up = false) {
   for (std::size_t k = 0; k < lags.size();) {
     std::size_t last = k;
     while (last + 1 < lags.size() && lags[last + 1] == lags[last] + 1) ++last;
-    text += fmt::format("{}{}:{}", text.empty() ? "" : ",", name, lags[k]);
+    text += fmt::format("{}{}:{}{}", text.empty() ? "" : ",", name, adds_up && k == 0 ? "+" : "", lags[k]);
     if (last > k) text += fmt::format("-{}", lags[last]);
     k = last + 1;
   }
@@ -46,7 +46,9 @@ Lags parse_lags(std::string_view text, const std::vector<std::string>& inputs,
     const std::size_t colon = part.rfind(':');
     if (colon == std::string_view::npos) refuse_part(part, "NAME:LAG or NAME:FIRST-LAST is needed, such as y:1-3");
     const std::string_view name = part.substr(0, colon);
-    const std::string_view range = part.substr(colon + 1);
+    std::string_view range = part.substr(colon + 1);
+    const bool adds_up = range.starts_with('+');
+    if (adds_up) range.remove_prefix(1);
     const std::size_t dash = range.find('-');
     const int first = lag_from(range.substr(0, dash), part);
     const int last = dash == std::string_view::npos ? first : lag_from(range.substr(dash + 1), part);
@@ -57,6 +59,11 @@ Lags parse_lags(std::string_view text, const std::vector<std::string>& inputs,
     std::vector<int>& list =
         output != outputs.end() ? lags.outputs[output - outputs.begin()] : lags.inputs[input - inputs.begin()];
     if (output != outputs.end() && first == 0) refuse_part(part, "lags of outputs begin at 1");
+    if (adds_up) {
+      if (output == outputs.end()) refuse_part(part, "only an output adds up its changes");
+      lags.adds_up.resize(outputs.size());
+      lags.adds_up[output - outputs.begin()] = true;
+    }
     for (int lag = first; lag <= last; ++lag) list.push_back(lag);
     if (comma == std::string_view::npos) break;
     rest = rest.substr(comma + 1);
@@ -73,13 +80,13 @@ Lags parse_lags(std::string_view text, const std::vector<std::string>& inputs,
 
 std::string text_of(const Lags& lags, const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
   std::string text;
-  for (std::size_t o = 0; o < lags.outputs.size(); ++o) append_lags(text, outputs[o], lags.outputs[o]);
+  for (std::size_t o = 0; o < lags.outputs.size(); ++o)
+    append_lags(text, outputs[o], lags.outputs[o], adds_up(lags, o));
   for (std::size_t i = 0; i < lags.inputs.size(); ++i) append_lags(text, inputs[i], lags.inputs[i]);
   return text;
 }
 
 void check_lags(const Lags& lags) {
-  Eigen::Index count = 0;
   const auto check = [&](const std::vector<int>& list, int least) {
     int before = least - 1;
     for (const int lag : list) {
@@ -89,15 +96,25 @@ void check_lags(const Lags& lags) {
       }
       before = lag;
     }
-    count += std::ssize(list);
   };
   for (const std::vector<int>& list : lags.outputs) check(list, 1);
   for (const std::vector<int>& list : lags.inputs) check(list, 0);
+  if (!lags.adds_up.empty() && lags.adds_up.size() != lags.outputs.size()) {
+    throw std::invalid_argument("lags: it is said of some outputs only whether they add up");
+  }
+  for (std::size_t o = 0; o < lags.outputs.size(); ++o) {
+    if (adds_up(lags, o) && (lags.outputs[o].empty() || lags.outputs[o].front() != 1)) {
+      throw std::invalid_argument("lags: those of an output that adds up begin at 1");
+    }
+  }
+  const Eigen::Index count = std::ssize(columns_of(lags));
   if (count == 0) throw std::invalid_argument("lags: there are none");
   if (count > most_lagged_columns) {
     throw std::invalid_argument(fmt::format("lags: there are {}, at most {} are taken", count, most_lagged_columns));
   }
 }
+
+bool adds_up(const Lags& lags, Eigen::Index output) { return !lags.adds_up.empty() && lags.adds_up[output]; }
 
 Eigen::Index longest_lag(const Lags& lags) {
   int longest = 0;
@@ -113,7 +130,7 @@ std::vector<LaggedColumn> columns_of(const Lags& lags) {
   std::vector<LaggedColumn> columns;
   for (int o = 0; o < std::ssize(lags.outputs); ++o) {
     const std::vector<int>& list = lags.outputs[o];
-    for (std::size_t k = 0; k < list.size(); ++k) {
+    for (std::size_t k = adds_up(lags, o) ? 1 : 0; k < list.size(); ++k) {
       columns.push_back({true, o, k == 0 ? list[0] : list[k - 1], k == 0 ? -1 : list[k]});
     }
   }

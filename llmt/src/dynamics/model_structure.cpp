@@ -268,7 +268,9 @@ Judged judge(const Task& task, const DynamicParts& parts, const std::vector<Stre
     x = rows.regressors.row(k).transpose();
     map.values(x.data(), y.data());
     for (Eigen::Index o = 0; o < y.size(); ++o) {
-      judged.one_step += std::pow((rows.outputs(k, o) - held_at_stops(parts.outputs[o], y(o))) / task.scale(o), 2);
+      const double last = rows.last(k, o);
+      const double value = held_at_stops(parts.outputs[o], y(o) + last) - last;
+      judged.one_step += std::pow((rows.outputs(k, o) - value) / task.scale(o), 2);
     }
   }
   return judged;

@@ -29,6 +29,7 @@ OutputErrorResult estimate_on_runs(const DynamicParts& start, const Series& seri
                                    const Eigen::VectorXd& scale, const OutputErrorOptions& options) {
   OutputErrorResult best{start, std::numeric_limits<double>::infinity(), 0};
   Eigen::VectorXd parameters = parameters_of(start);
+  if (parameters.size() == 0) return best;  // too few rows for a tree, and no polynomial
   double rows = 0.0;
   for (const Window& window : windows) rows += static_cast<double>((window.end - window.first) * scale.size());
   const Eigen::VectorXd penalty =

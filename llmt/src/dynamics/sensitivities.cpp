@@ -32,13 +32,21 @@ bool run_with_sensitivities(const DynamicParts& parts, const Series& series, con
     const Eigen::Index here = row - window.begin;
     regressors_of_run(columns, run, here, series.inputs, row, x.data());
     map.derivatives(x.data(), y.data(), by_regressor, now);
+    // Whether the output at an earlier row moves with the parameters: it is not measured, and not at a stop.
+    const auto moves = [&](Eigen::Index earlier, Eigen::Index output, bool is_held) {
+      return earlier >= window.first - window.begin &&
+             (!is_held || run.held(earlier, output) == run.free(earlier, output));
+    };
+    add_last(parts.lags, run, here, y.data());
+    for (Eigen::Index o = 0; o < outputs; ++o) {
+      if (adds_up(parts.lags, o) && moves(here - 1, o, true)) now.col(o) += past[(here - 1) % memory].col(o);
+    }
     for (std::size_t c = 0; c < columns.size(); ++c) {
       const LaggedColumn& column = columns[c];
       if (!column.is_output) continue;
       const auto add = [&](int lag, double sign, bool is_held) {
         const Eigen::Index earlier = here - lag;
-        if (earlier < window.first - window.begin) return;  // measured
-        if (is_held && run.held(earlier, column.signal) != run.free(earlier, column.signal)) return;
+        if (!moves(earlier, column.signal, is_held)) return;
         const auto& derivatives = past[earlier % memory].col(column.signal);
         for (Eigen::Index o = 0; o < outputs; ++o) now.col(o) += sign * by_regressor(o, c) * derivatives;
       };

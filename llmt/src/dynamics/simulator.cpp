@@ -103,6 +103,7 @@ const Eigen::VectorXd& Simulator::predict_next(const Eigen::Ref<const Eigen::Vec
   regressors_of_run(s.model.columns(), s.outputs, now, s.inputs, now, s.x.data());
   if (s.x.allFinite()) {
     s.map.values(s.x.data(), s.result.data());
+    add_last(s.model.parts().lags, s.outputs, s.outputs.held.rows(), s.result.data());
   } else {
     s.result.setConstant(std::nan(""));
   }

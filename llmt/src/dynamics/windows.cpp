@@ -34,12 +34,17 @@ RegressorRows regressor_rows(const Series& series, const Lags& lags, const std::
   }
   result.regressors.resize(std::ssize(result.rows), std::ssize(columns));
   result.outputs.resize(std::ssize(result.rows), series.outputs.cols());
+  result.last.setZero(std::ssize(result.rows), series.outputs.cols());
+  Eigen::VectorXd last(series.outputs.cols());
   const Outputs measured(series.outputs);
   Eigen::VectorXd x(std::ssize(columns));
   for (Eigen::Index k = 0; k < std::ssize(result.rows); ++k) {
     regressors_of_run(columns, measured, result.rows[k], series.inputs, result.rows[k], x.data());
     result.regressors.row(k) = x.transpose();
-    result.outputs.row(k) = series.outputs.row(result.rows[k]);
+    last.setZero();
+    add_last(lags, measured, result.rows[k], last.data());
+    result.last.row(k) = last.transpose();
+    result.outputs.row(k) = series.outputs.row(result.rows[k]) - result.last.row(k);
   }
   return result;
 }
@@ -57,6 +62,7 @@ Eigen::Index run_window(const DynamicParts& parts, const Series& series, const W
     const Eigen::Index here = row - window.begin;
     regressors_of_run(columns, run, here, series.inputs, row, x.data());
     map.values(x.data(), y.data());
+    add_last(parts.lags, run, here, y.data());
     run.free.row(here) = y.transpose();
     for (Eigen::Index o = 0; o < y.size(); ++o) run.held(here, o) = held_at_stops(parts.outputs[o], y(o));
     if (((y.array() >= lower.array()) && (y.array() <= upper.array())).all()) continue;

@@ -24,8 +24,9 @@ std::vector<Window> windows_of(const std::vector<Stretch>& stretches, Eigen::Ind
 /// Rows of one-step learning.
 struct RegressorRows {
   Eigen::MatrixXd regressors;      ///< rows x columns
-  Eigen::MatrixXd outputs;         ///< rows x outputs
+  Eigen::MatrixXd outputs;         ///< rows x outputs; of those that add up, the changes
   std::vector<Eigen::Index> rows;  ///< of the series
+  Eigen::MatrixXd last = {};       ///< rows x outputs: what the changes are added to; 0 for the other outputs
 };
 
 /// The regressor matrix of all rows of the stretches whose past, `initial` rows, lies in the stretch.
@@ -53,6 +54,13 @@ inline void regressors_of_run(const std::vector<LaggedColumn>& columns, const Ou
     } else {
       *x++ = outputs.free(row - column.lag, column.signal) - outputs.held(row - column.minus_lag, column.signal);
     }
+  }
+}
+
+/// Adds to what the map gives at row `row` of a run the values before, of outputs that add up.
+inline void add_last(const Lags& lags, const Outputs& run, Eigen::Index row, double* y) {
+  for (std::size_t o = 0; o < lags.adds_up.size(); ++o) {
+    if (lags.adds_up[o]) y[o] += run.held(row - 1, static_cast<Eigen::Index>(o));
   }
 }
 

@@ -30,6 +30,31 @@ TEST(DynamicChoice, AStopIsFoundAndHelps) {
   EXPECT_EQ(fit.model.parts().outputs[0].lower_stop, -std::numeric_limits<double>::infinity());
 }
 
+// A slide driven by a force: its position adds up. The value of the position says nothing, and a model that uses it
+// has a pole near 1 that is wrong over a long run.
+TEST(DynamicChoice, AnOutputThatAddsUpHasItsPoleAtOne) {
+  const auto slide = [](double y1, double y2, double u1) { return y1 + 0.9 * (y1 - y2) + 0.1 * u1; };
+  const Series series = systems::record(200, 21, slide, 0.02);
+  llmt::DynamicOptions options;
+  options.rest = llmt::RestLearner::none;
+  const llmt::DynamicFit fit = llmt::fit_dynamic(series, options);
+  EXPECT_EQ(fit.model.parts().lags.adds_up, std::vector<bool>{true});
+  const llmt::LocalDynamics local = llmt::local_dynamics(fit.model).front();
+  EXPECT_NEAR(std::abs(local.poles.front().z - 1.0), 0.0, 1e-12);
+  EXPECT_TRUE(std::isnan(local.steady_gain(0, 0)));
+  options.lags = fit.model.parts().lags;
+  options.lags->adds_up.clear();
+  const llmt::DynamicFit with_value = llmt::fit_dynamic(series, options);
+  const Series longer = systems::record(2000, 22, slide);
+  const double error = llmt::run_errors(fit.model, longer, 3, 0).rmse(0);
+  EXPECT_LT(error, 0.5 * llmt::run_errors(with_value.model, longer, 3, 0).rmse(0));
+  // And a system that comes back is not taken for one.
+  options.lags.reset();
+  EXPECT_TRUE(llmt::fit_dynamic(systems::record(200, 23, systems::oscillator, 0.02), options)
+                  .model.parts()
+                  .lags.adds_up.empty());
+}
+
 // Two outputs that drive each other, one record behind the other.
 TEST(DynamicChoice, OutputsAreInputsOfEachOther) {
   llmt::Random random(10);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "dynamics/model_structure.hpp"
 #include "dynamics/one_step.hpp"
 #include "dynamics/output_error.hpp"
 #include "dynamics/polynomial.hpp"
@@ -133,6 +134,7 @@ struct SensitivityCase {
   bool has_tree;
   llmt::GrowthRule rule;
   bool has_stop;
+  bool adds_up = false;
 };
 
 TEST(Dynamics, SensitivitiesAreThoseOfDifferences) {
@@ -143,11 +145,13 @@ TEST(Dynamics, SensitivitiesAreThoseOfDifferences) {
       {"gates", 0, false, true, llmt::GrowthRule::hilomot, false},
       {"Gaussians", 1, false, true, llmt::GrowthRule::lolimot, false},
       {"stops", 2, true, false, llmt::GrowthRule::rd, true},
+      {"adds up", 1, false, true, llmt::GrowthRule::lolimot, false, true},
+      {"adds up to a stop", 2, true, false, llmt::GrowthRule::rd, true, true},
   };
   const Series series = systems::record(150, 3, systems::duffing, 0.05, 2.0);
   for (const SensitivityCase& of : cases) {
     SCOPED_TRACE(of.name);
-    DynamicParts parts = parts_for(series, {{{1, 2}}, {{1, 2}}}, of.degree, of.is_held);
+    DynamicParts parts = parts_for(series, {{{1, 2}}, {{1, 2}}, {of.adds_up}}, of.degree, of.is_held);
     if (of.has_tree) add_tree(parts, series, of.rule, 3);
     if (of.has_stop) parts.outputs[0].upper_stop = 0.5 * parts.outputs[0].high;
     const std::vector<llmt::Window> windows = llmt::windows_of({{0, 80}, {90, 150}}, 2);
@@ -169,6 +173,16 @@ TEST(Dynamics, SensitivitiesAreThoseOfDifferences) {
     }
     EXPECT_LT((differences - equations.gradient).norm(), 1e-5 * (1.0 + differences.norm()));
   }
+}
+
+// A stretch so short that no tree is learned leaves a model without parameters, which predicts nothing.
+TEST(Dynamics, TooFewRowsForATreeLeaveNoParameters) {
+  const Series series = systems::record(60, 3, systems::duffing, 0.05, 2.0);
+  const llmt::Task task = llmt::task_of(series, {});
+  const llmt::ModelStructure tree{
+      .lags = {{{1, 2}}, {{1, 2}}}, .degree = 0, .rest = llmt::RestKind::tree, .leaves = 2, .on_runs = true};
+  EXPECT_EQ(llmt::parameters_of(llmt::estimate(task, tree, {{0, 15}}, 5)).size(), 0);
+  EXPECT_GT(llmt::parameters_of(llmt::estimate(task, tree, {{0, 60}}, 5)).size(), 0);
 }
 
 class DynamicC : public oracle::CompiledC {};
@@ -204,6 +218,9 @@ TEST_F(DynamicC, RunsToTheBytesOfTheLibrary) {
   models.emplace_back("blend with stops", parts_for(series, {{{1, 2}}, {{1, 4}}}, 1));
   add_tree(models.back().second, series, llmt::GrowthRule::rd, 4);
   models.back().second.outputs[0].upper_stop = 0.5;
+  models.emplace_back("adds up to a stop", parts_for(series, {{{1, 2}}, {{1, 4}}, {true}}, 1));
+  add_tree(models.back().second, series, llmt::GrowthRule::lolimot, 3);
+  models.back().second.outputs[0].upper_stop = 0.5;
   models.emplace_back("no past", parts_for(series, {{{}}, {{0}}}, 2));
   const Series asked = systems::record(400, 5, systems::duffing, 0.0, 3.0);
   for (const auto& [name, parts] : models) {
@@ -223,7 +240,7 @@ TEST_F(DynamicC, RunsToTheBytesOfTheLibrary) {
 
 TEST(Dynamics, FilesReadBackToTheSameRun) {
   const Series series = systems::record(200, 6, systems::duffing, 0.05, 2.0);
-  DynamicParts parts = parts_for(series, {{{1, 2}}, {{1}}}, 2, true);
+  DynamicParts parts = parts_for(series, {{{1, 2}}, {{1}}, {true}}, 2, true);
   add_tree(parts, series, llmt::GrowthRule::hilomot, 3);
   parts.outputs[0].lower_stop = -1.0;
   parts.is_stable = false;

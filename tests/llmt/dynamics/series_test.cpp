@@ -25,18 +25,30 @@ TEST(Lags, AreReadAndWritten) {
   EXPECT_EQ(llmt::parse_lags(llmt::text_of(lags, inputs, outputs), inputs, outputs), lags);
 }
 
+TEST(Lags, SayWhichOutputsAddUp) {
+  const llmt::Lags lags = llmt::parse_lags("y:+1-3,u:0", {"u"}, {"x", "y"});
+  EXPECT_EQ(lags.adds_up, (std::vector<bool>{false, true}));
+  EXPECT_EQ(llmt::text_of(lags, {"u"}, {"x", "y"}), "y:+1-3,u:0");
+  EXPECT_EQ(llmt::parse_lags("y:+1-3,u:0", {"u"}, {"x", "y"}), lags);
+  EXPECT_EQ(llmt::column_names(llmt::columns_of(lags), {"u"}, {"x", "y"}),
+            (std::vector<std::string>{"y(t-1)-y(t-2)", "y(t-2)-y(t-3)", "u(t)"}));
+  llmt::Series series;
+  series.outputs = Eigen::VectorXd::LinSpaced(6, 0.0, 5.0).array().square();
+  series.inputs = Eigen::VectorXd::LinSpaced(6, 10.0, 15.0);
+  const llmt::RegressorRows rows = llmt::regressor_rows(series, {{{1, 2}}, {{0}}, {true}}, {{0, 6}}, 4);
+  EXPECT_EQ(rows.outputs.col(0), (Eigen::Vector2d{16.0 - 9.0, 25.0 - 16.0}));
+  EXPECT_EQ(rows.last.col(0), (Eigen::Vector2d{9.0, 16.0}));
+}
+
 TEST(Lags, ThatCannotBeReadAreNamed) {
-  const std::vector<std::pair<std::string, std::string>> cases = {{"", "NAME:LAG"},
-                                                                  {"y", "\"y\""},
-                                                                  {"y:", "\"y:\""},
-                                                                  {"y:0-2", "begin at 1"},
-                                                                  {"z:1", "no such input"},
-                                                                  {"y:3-1", "ends before"},
-                                                                  {"u:1-99999", "at most"},
-                                                                  {"y:1,,u:1", "\"\""},
-                                                                  {"y:1.5", "\"y:1.5\""},
-                                                                  {"y:-1", "\"y:-1\""},
-                                                                  {"u:0-5000", "there are 5001"}};
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"", "NAME:LAG"},           {"y", "\"y\""},
+      {"y:", "\"y:\""},           {"y:0-2", "begin at 1"},
+      {"z:1", "no such input"},   {"y:3-1", "ends before"},
+      {"u:1-99999", "at most"},   {"y:1,,u:1", "\"\""},
+      {"y:1.5", "\"y:1.5\""},     {"y:-1", "\"y:-1\""},
+      {"u:+1", "only an output"}, {"y:+2-3,u:1", "begin at 1"},
+      {"y:+1", "there are none"}, {"u:0-5000", "there are 5001"}};
   for (const auto& [text, message] : cases) {
     try {
       llmt::parse_lags(text, {"u"}, {"y"});
