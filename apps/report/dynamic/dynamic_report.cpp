@@ -127,10 +127,14 @@ std::string dynamic_text(const DynamicRun& run, std::size_t width) {
   const DynamicSummary& summary = run.fit.summary;
   const DynamicModel& model = run.fit.model;
   const DynamicCandidate& chosen = summary.compared[summary.chosen];
-  std::string text = fmt::format("{}: {} rows of {} {} each, {} inputs, {} outputs\n", run.data, summary.rows,
-                                 number(model.parts().sample_time, 6), model.parts().time_unit, model.num_inputs(),
-                                 model.num_outputs());
+  std::string text =
+      fmt::format("{}: {} rows of {} {} each, {} input{}, {} output{}\n", run.data, summary.rows,
+                  number(model.parts().sample_time, 6), model.parts().time_unit, model.num_inputs(),
+                  model.num_inputs() == 1 ? "" : "s", model.num_outputs(), model.num_outputs() == 1 ? "" : "s");
   text += fmt::format("Model: {}\nLags: {}\n", chosen.description, lags_text(model, chosen.lags));
+  for (const Signal& input : model.parts().inputs) {
+    if (input.low == input.high) text += fmt::format("{} never changes, so nothing is learned from it\n", input.name);
+  }
   text += fmt::format("Outside of the training ranges it goes on as: {}\n", summary.continuation);
   for (const Signal& output : model.parts().outputs) {
     if (std::isfinite(output.lower_stop)) text += fmt::format("{} has a stop at {}\n", output.name, output.lower_stop);

@@ -137,6 +137,17 @@ bool is_exact(const Missing& missing) {
          missing.found.empty();
 }
 
+// Where a term says what a state adds, a model that moves has the state itself.
+std::string dynamic_model_text(const TermsSummary& summary) {
+  std::vector<std::string> outputs;
+  for (const discovery::Gap& gap : summary.missing.gaps) outputs.push_back(gap.output);
+  return fmt::format(
+      "\nNext: llmt fit {} --target {} --inputs {} --lags auto --time {}{} -o model.json\n"
+      "It learns a model that has the state; its poles say how fast the state is.\n",
+      summary.measured, fmt::join(outputs, ","), fmt::join(summary.inputs, ","), summary.time,
+      summary.group.empty() ? "" : " --groups " + summary.group);
+}
+
 }  // namespace
 
 std::string terms_text(const TermsSummary& summary, std::size_t width) {
@@ -200,6 +211,7 @@ std::string terms_text(const TermsSummary& summary, std::size_t width) {
     return text;
   }
   if (!summary.corrected.empty()) text += fmt::format("\nCorrected simulation written to {}\n", summary.corrected);
+  if (missing.answer == Answer::inner_state && !summary.time.empty()) text += dynamic_model_text(summary);
   return text;
 }
 

@@ -8,6 +8,7 @@
 #include "base/parallel.hpp"
 #include "dynamics/grid.hpp"
 #include "dynamics/one_step.hpp"
+#include "llmt/dynamic_analysis.hpp"
 
 namespace llmt {
 namespace {
@@ -59,11 +60,19 @@ void keep_best(std::vector<Trial>& trials, std::size_t count) {
   trials = std::move(kept);
 }
 
+// No delay of the inputs that change, no lags of the others: what never changes explains nothing.
+std::vector<int> no_delays(const Task& task) {
+  std::vector<int> delays;
+  for (const Signal& input : task.inputs) delays.push_back(input.low < input.high ? 0 : -1);
+  return delays;
+}
+
 // The lag of each input from which on it helps a linear model, one input after the other.
 std::vector<int> find_delays(const Task& task, const std::vector<StretchFold>& folds, bool on_runs, Work& work) {
   const Eigen::Index outputs = task.series.outputs.cols();
-  std::vector<int> delays(task.inputs.size(), 0);
+  std::vector<int> delays = no_delays(task);
   for (std::size_t i = 0; i < delays.size(); ++i) {
+    if (delays[i] < 0) continue;
     std::vector<Trial> trials;
     for (int delay = 0; delay <= most_delay; ++delay) {
       std::vector<int> tried = delays;
@@ -93,10 +102,9 @@ bool take_stops(Task& task, const std::vector<Stretch>& stretches, const std::ve
   if (!any) return false;
   std::vector<Trial> trials;
   for (const bool has_stops : {false, true}) {
-    ModelStructure candidate{
-        .lags = simple_lags(std::vector<int>(task.inputs.size(), 0), std::ssize(task.outputs), 2, 2),
-        .has_stops = has_stops,
-        .on_runs = task.horizon != 1};
+    ModelStructure candidate{.lags = simple_lags(no_delays(task), std::ssize(task.outputs), 2, 2),
+                             .has_stops = has_stops,
+                             .on_runs = task.horizon != 1};
     trials.push_back({candidate});
   }
   try_on(task, folds, search_iterations, trials, work);
@@ -115,16 +123,28 @@ Lags with_sums(Lags lags, const std::vector<bool>& adds_up) {
   return lags;
 }
 
-// Which outputs add up their changes: those of which a linear model without their values runs as well.
-std::vector<bool> find_sums(const Task& task, const std::vector<StretchFold>& folds, Work& work) {
+// Whether a linear model learned from all stretches has a pole that is slower than the longest of them: |1 - z| < 1 /
+// n.
+bool has_a_pole_near_one(const Task& task, const ModelStructure& linear, const std::vector<Stretch>& stretches) {
+  Eigen::Index longest = 1;
+  for (const Stretch& stretch : stretches) longest = std::max(longest, stretch.rows());
+  const DynamicModel model(estimate(task, linear, stretches, search_iterations));
+  const std::vector<Pole> poles = local_dynamics(model).front().poles;
+  return std::ranges::any_of(
+      poles, [&](const Pole& pole) { return std::abs(1.0 - pole.z) * static_cast<double>(longest) < 1.0; });
+}
+
+// Which outputs add up their changes: those of which a linear model without their values runs as well, where one with
+// them has a pole near 1.
+std::vector<bool> find_sums(const Task& task, const std::vector<Stretch>& stretches,
+                            const std::vector<StretchFold>& folds, Work& work) {
   std::vector<bool> adds_up(task.outputs.size(), false);
-  const Lags lags = simple_lags(std::vector<int>(task.inputs.size(), 0), std::ssize(task.outputs), 2, 2);
+  const Lags lags = simple_lags(no_delays(task), std::ssize(task.outputs), 2, 2);
   for (std::size_t o = 0; o < adds_up.size(); ++o) {
-    std::vector<Trial> trials;
-    for (const bool tried : {false, true}) {
-      adds_up[o] = tried;
-      trials.push_back({{.lags = with_sums(lags, adds_up), .on_runs = true}});
-    }
+    const ModelStructure with_value{.lags = with_sums(lags, adds_up), .on_runs = true};
+    if (!has_a_pole_near_one(task, with_value, stretches)) break;
+    adds_up[o] = true;
+    std::vector<Trial> trials = {{with_value}, {{.lags = with_sums(lags, adds_up), .on_runs = true}}};
     Work part(work, 1.0 / static_cast<double>(adds_up.size()));
     try_on(task, folds, search_iterations, trials, part);
     adds_up[o] = trials[1].judged.diverged == 0 && trials[1].error <= as_good_without_value * trials[0].error;
@@ -222,7 +242,7 @@ Chosen choose(Task& task, const std::vector<Stretch>& stretches, const DynamicOp
     Work summing(finding, 0.2);
     Work delaying(finding, 0.8);
     std::vector<bool> sums;
-    if (task.horizon != 1) sums = find_sums(task, folds, summing);
+    if (task.horizon != 1) sums = find_sums(task, searched, folds, summing);
     const std::vector<int> delays = find_delays(task, folds, task.horizon != 1, delaying);
     lags = lag_candidates(delays, std::ssize(task.outputs), rows);
     // A linear model finds no delay where the system is far from linear: one row at most is tried too.

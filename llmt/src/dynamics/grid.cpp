@@ -56,7 +56,7 @@ Lags simple_lags(const std::vector<int>& delays, Eigen::Index outputs, int past,
     for (int lag = 1; lag <= past; ++lag) list.push_back(lag);
   }
   for (std::size_t i = 0; i < delays.size(); ++i) {
-    for (int k = 0; k < count; ++k) lags.inputs[i].push_back(delays[i] + k);
+    for (int k = 0; k < count && delays[i] >= 0; ++k) lags.inputs[i].push_back(delays[i] + k);
   }
   return lags;
 }
@@ -70,9 +70,10 @@ std::vector<Lags> lag_candidates(const std::vector<int>& delays, Eigen::Index ou
   // outputs do not show.
   constexpr Shape shapes[] = {{1, 1}, {1, 2}, {2, 1}, {2, 2},  {2, 3},  {3, 1}, {3, 2},  {3, 3},  {2, 5},  {3, 5},
                               {4, 4}, {5, 5}, {1, 8}, {1, 16}, {1, 24}, {3, 8}, {3, 24}, {2, 16}, {0, 16}, {0, 30}};
+  const bool has_inputs = std::ranges::any_of(delays, [](int delay) { return delay >= 0; });
   std::vector<Lags> result;
   for (const Shape& shape : shapes) {
-    if (delays.empty() && (shape.past == 0 || shape.count > 1)) continue;
+    if (!has_inputs && (shape.past == 0 || shape.count > 1)) continue;
     Lags lags = simple_lags(delays, outputs, shape.past, shape.count);
     if (20 * columns_in(lags) > rows || columns_in(lags) > 60) continue;
     result.push_back(std::move(lags));

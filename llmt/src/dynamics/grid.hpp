@@ -8,10 +8,10 @@
 
 namespace llmt {
 
-/// The lags that are compared where the caller gives none. `delays`: the first lag of each input.
+/// The lags that are compared where the caller gives none. `delays`: the first lag of each input; -1: it has no lags.
 std::vector<Lags> lag_candidates(const std::vector<int>& delays, Eigen::Index outputs, Eigen::Index rows);
 
-/// Lags 1 ... `past` of every output and, of every input, `count` ones from its delay on.
+/// Lags 1 ... `past` of every output and, of every input that has any, `count` ones from its delay on.
 Lags simple_lags(const std::vector<int>& delays, Eigen::Index outputs, int past, int count);
 
 /// A few candidates that tell good lags from bad ones.

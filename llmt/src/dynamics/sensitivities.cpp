@@ -77,6 +77,7 @@ RunEquations run_equations(const DynamicParts& parts, const Series& series, cons
   Eigen::VectorXd errors(rows_together);
   Eigen::Index filled = 0;
   const auto flush = [&] {
+    if (filled == 0) return;  // Eigen divides by the number of columns
     sums.normal.selfadjointView<Eigen::Lower>().rankUpdate(block.leftCols(filled));
     sums.gradient += block.leftCols(filled) * errors.head(filled);
     filled = 0;

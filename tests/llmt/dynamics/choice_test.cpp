@@ -55,6 +55,21 @@ TEST(DynamicChoice, AnOutputThatAddsUpHasItsPoleAtOne) {
                   .lags.adds_up.empty());
 }
 
+// What never changes is no past to look at.
+TEST(DynamicChoice, AnInputThatNeverChangesHasNoLags) {
+  Series series = systems::record(200, 12, systems::oscillator);
+  series.input_names = {"u", "still"};
+  series.inputs.conservativeResize(Eigen::NoChange, 2);
+  series.inputs.col(1).setConstant(3.0);
+  llmt::DynamicOptions options;
+  options.rest = llmt::RestLearner::none;
+  const llmt::Lags lags = llmt::fit_dynamic(series, options).model.parts().lags;
+  EXPECT_FALSE(lags.inputs[0].empty());
+  EXPECT_TRUE(lags.inputs[1].empty());
+  series.inputs.col(0).setZero();
+  EXPECT_TRUE(llmt::fit_dynamic(series, options).model.parts().lags.inputs[0].empty());
+}
+
 // Two outputs that drive each other, one record behind the other.
 TEST(DynamicChoice, OutputsAreInputsOfEachOther) {
   llmt::Random random(10);

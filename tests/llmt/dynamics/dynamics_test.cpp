@@ -175,6 +175,18 @@ TEST(Dynamics, SensitivitiesAreThoseOfDifferences) {
   }
 }
 
+// Rows are added 128 at a time: a run of as many leaves none.
+TEST(Dynamics, RunsOfAnyLengthHaveTheirEquations) {
+  const Series series = systems::record(300, 3, systems::duffing, 0.05, 2.0);
+  const DynamicParts parts = parts_for(series, second_order, 1);
+  const Eigen::VectorXd scale = Eigen::VectorXd::Ones(1);
+  for (const Eigen::Index rows : {1, 127, 128, 256}) {
+    const llmt::RunEquations equations = run_equations(parts, series, {{0, 2, 2 + rows}}, scale);
+    EXPECT_EQ(equations.rows, static_cast<double>(rows));
+    EXPECT_DOUBLE_EQ(equations.cost, run_cost(parts, series, {{0, 2, 2 + rows}}, scale)) << rows;
+  }
+}
+
 // A stretch so short that no tree is learned leaves a model without parameters, which predicts nothing.
 TEST(Dynamics, TooFewRowsForATreeLeaveNoParameters) {
   const Series series = systems::record(60, 3, systems::duffing, 0.05, 2.0);
