@@ -154,7 +154,7 @@ std::string signals_text(const SignalsSummary& summary, std::size_t width) {
   for (const std::string& line : lines) text += wrapped(line, width, 2) + "\n";
   text +=
       "\n" +
-      wrapped("Noise, as standard deviations, estimated above four times the cutoff and taken for white:", width, 2) +
+      wrapped("Noise, as standard deviations, estimated from frequencies of four times the cutoff and more:", width, 2) +
       "\n" + table_of_noise(summary, width);
   return text;
 }

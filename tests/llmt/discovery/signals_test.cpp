@@ -146,6 +146,28 @@ TEST(Signals, NoiseIsToldFromTheMotion) {
   }
 }
 
+// Noise with a memory is strongest below the cutoff, where the motion hides it. What is left of it in the table is said
+// to a factor of 1.7 where its corner, 1 / (2 pi memory), is not above the cutoff.
+TEST(Signals, NoiseWithAMemoryIsToldByItsRise) {
+  for (const double memory : {0.016, 0.03}) {
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      llmt::Random random(seed);
+      const double keep = std::exp(-0.002 / memory);
+      double slow = random.normal();
+      const auto noise = [&](double) {
+        slow = keep * slow + std::sqrt(1.0 - keep * keep) * random.normal();
+        return 0.2 * slow;
+      };
+      const auto still = [](double) { return 0.0; };
+      const Signals table = signals(log_of(20000, 500.0, still, noise), {.cutoff = 10.0, .standstill = {0.0}});
+      const Eigen::VectorXd left = table.torques.col(0).array() - table.torques.col(0).mean();
+      const double ratio = table.torque_noise[0].in_table / (left.norm() / std::sqrt(static_cast<double>(left.size())));
+      EXPECT_GT(ratio, 1.0 / 1.7) << memory;
+      EXPECT_LT(ratio, 1.7) << memory;
+    }
+  }
+}
+
 TEST(Signals, RowsAtStandstillAndReversalAreLeftOut) {
   llmt::Random random(1);
   const auto moves_and_rests = [&](double t) {

@@ -37,7 +37,7 @@ struct Stretch {
 
 /// What white noise of a column becomes in the filter.
 struct ColumnNoise {
-  double in_log = 0.0;           ///< standard deviation of a sample, estimated from frequencies far above the cutoff
+  double in_log = 0.0;           ///< standard deviation of white noise as strong as the noise is near the cutoff
   double in_table = 0.0;         ///< standard deviation of the filtered signal
   double of_velocity = 0.0;      ///< of its first derivative
   double of_acceleration = 0.0;  ///< of its second derivative

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "discovery/signals/kernel.hpp"
+#include "discovery/signals/noise.hpp"
 #include "discovery/signals/stretches.hpp"
 
 namespace llmt::discovery {
@@ -44,32 +45,8 @@ void check_options(const SignalsOptions& options, Eigen::Index positions, double
   }
 }
 
-// Mean squares of differences of order 8 over a distance of `stride` samples, by the factor that white noise has there,
-// in consecutive parts of the samples. Differences of this order leave of a signal below the cutoff less than 1e-5.
-void add_noise_variances(const Eigen::Ref<const Eigen::VectorXd>& samples, Eigen::Index stride,
-                         std::vector<double>& variances) {
-  constexpr double binomials[] = {1, -8, 28, -56, 70, -56, 28, -8, 1};
-  constexpr double factor = 12870.0;  // sum of their squares
-  const Eigen::Index n = samples.size() - 8 * stride;
-  if (n <= 0) return;
-  Eigen::VectorXd differences = Eigen::VectorXd::Zero(n);
-  for (Eigen::Index k = 0; k <= 8; ++k) differences += binomials[k] * samples.segment(k * stride, n);
-  const Eigen::Index parts = std::max<Eigen::Index>(n / 100, 1);
-  for (Eigen::Index p = 0; p < parts; ++p) {
-    const Eigen::Index begin = p * n / parts;
-    const Eigen::Index end = (p + 1) * n / parts;
-    variances.push_back(differences.segment(begin, end - begin).squaredNorm() /
-                        (factor * static_cast<double>(end - begin)));
-  }
-}
-
-// Parts with a shock do not count: the middle one of the variances.
-ColumnNoise noise_of(std::vector<double> variances, const Kernel& kernel, double relative_rounding,
-                     bool differentiated) {
+ColumnNoise noise_of(double deviation, const Kernel& kernel, double relative_rounding, bool differentiated) {
   ColumnNoise noise;
-  if (variances.empty()) return noise;
-  std::ranges::nth_element(variances, variances.begin() + std::ssize(variances) / 2);
-  const double deviation = std::sqrt(variances[variances.size() / 2]);
   noise.in_log = deviation > relative_rounding ? deviation : 0.0;  // below it are the digits of double
   const Eigen::RowVector3d gains = kernel.weights.colwise().norm();
   noise.in_table = noise.in_log * gains(0);
@@ -167,9 +144,7 @@ Signals signals(const Log& log, const SignalsOptions& options) {
   const Kernel kernel = kernel_of(options.cutoff, timing.step);
   signals.correlation = correlation_at(kernel, signals.every);
 
-  // Frequencies from four times the cutoff on are taken for noise.
-  const auto stride = std::max<Eigen::Index>(1, std::lround(0.125 / (options.cutoff * timing.step)));
-  std::vector<std::vector<double>> variances(columns);
+  std::vector<std::vector<Eigen::VectorXd>> stretches(columns);
   std::vector<Filtered> rows;
   for (const Part& part : timing.parts) {
     signals.stretches.push_back({log.runs.empty() ? "" : log.runs[part.first], part.first, part.last, 0});
@@ -177,7 +152,7 @@ Signals signals(const Log& log, const SignalsOptions& options) {
     const Eigen::Index n = samples.values.rows();
     signals.resampled = signals.resampled || samples.interpolated;
     signals.ends_cut += std::min(n, 2 * half);
-    for (Eigen::Index c = 0; c < columns; ++c) add_noise_variances(samples.values.col(c), stride, variances[c]);
+    for (Eigen::Index c = 0; c < columns; ++c) stretches[c].emplace_back(samples.values.col(c));
     for (Eigen::Index i = half; i + half < n; i += signals.every) {
       rows.push_back({std::ssize(signals.stretches) - 1, samples.start + static_cast<double>(i) * samples.step,
                       samples.rows[i], samples.values.middleRows(i - half, 2 * half + 1).transpose() * kernel.weights});
@@ -187,7 +162,8 @@ Signals signals(const Log& log, const SignalsOptions& options) {
     const double largest =
         (c < positions ? log.positions.col(c) : log.torques.col(c - positions)).cwiseAbs().maxCoeff();
     std::vector<ColumnNoise>& noise = c < positions ? signals.position_noise : signals.torque_noise;
-    noise.push_back(noise_of(std::move(variances[c]), kernel, 1e-15 * largest, c < positions));
+    const double deviation = noise_at_cutoff(stretches[c], options.cutoff, timing.step);
+    noise.push_back(noise_of(deviation, kernel, 1e-15 * largest, c < positions));
   }
   set_standstill(signals, options, log, rows, kernel);
   if (drops) {
