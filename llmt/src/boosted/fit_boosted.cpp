@@ -84,6 +84,7 @@ RoundOptions usual_rounds(const BoostingData& data, const BoostOptions& options)
                    .ridges = {.constant = regime.ridge, .slope = 1.0},
                    .searched = regime.searched},
           .rate = regime.rate,
+          .most_rounds = options.max_rounds,
           .patience = regime.patience,
           .max_threads = options.max_threads};
 }
@@ -129,13 +130,13 @@ Average stopped(const BoostingData& data, const Eigen::VectorXd& output, const S
   summary.rows = is_refitted ? output.size() : std::ssize(apart.train);
   Average result{.variants = plan.compared, .residuals = rounds.residuals, .rmse = rounds.rmse};
   const bool is_tree_tried =
-      !data.is_hold_out_given &&
-      (!regime.races || (!regime.rules_of_tree.empty() && std::ssize(rounds.trees) <= regime.most_rounds_of_tree));
+      !data.is_hold_out_given && (regime.uses_all_parts || (!regime.rules_of_tree.empty() &&
+                                                            std::ssize(rounds.trees) <= regime.most_rounds_of_tree));
   if (is_refitted) {
     RoundOptions more = plan.rounds;
     more.most_rounds = static_cast<int>(std::ceil(more_trees * static_cast<double>(rounds.trees.size())));
     std::vector<GrowingTree> kept;
-    if (regime.races && more.tree.symmetric) kept = std::move(rounds.trees);
+    if (!regime.uses_all_parts && more.tree.symmetric) kept = std::move(rounds.trees);
     Work refitting(work, (uses_all_parts ? 0.3 : is_tree_tried ? 0.7 : 1.0) * work.left());
     rounds = boost(plan.rows, output, all_rows(output.size()), {}, kept, more, random, refitting);
   } else if (is_tree_tried) {
@@ -171,12 +172,11 @@ BoostedSum fit_output(const BoostingData& data, Eigen::Index output, const Boost
     return {.base = mean, .features = {}, .trees = {}};
   }
   SumPlan plan{usual_rounds(data, options), "symmetric", data.rows};
-  if (data.regime.races) {
+  if (data.regime.race != RaceRows::none) {
     Work racing(work, 0.2);
     plan = race(data, y, plan.rounds, options.seed, racing);
   }
   if (options.rate > 0.0) plan.rounds.rate = options.rate;
-  plan.rounds.most_rounds = options.max_rounds;
   Random random(options.seed);
   Average result;
   if (data.regime.takes_turns) {

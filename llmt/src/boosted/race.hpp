@@ -18,8 +18,9 @@ struct SumPlan {
   std::vector<BoostVariant> compared = {};  ///< for the standardised output; empty: there was no race
 };
 
-/// The winner among symmetric trees with the options `usual`, free ones, the better of them with pairs of features, and
-/// the same with soft trees, see "The race" in docs/algorithms/boosting.md. `output`: standardised.
+/// The winner among symmetric trees with the options `usual` and their variants, see "The race" in
+/// docs/algorithms/boosting.md: free trees (not where all parts are raced), constants in place of linear models, pairs
+/// of features, soft trees. `output`: standardised.
 SumPlan race(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, std::uint64_t seed,
              Work& work);
 

@@ -16,6 +16,13 @@ inline constexpr Eigen::Index no_limit = std::numeric_limits<Eigen::Index>::max(
 inline constexpr std::array by_ra = {GrowthRule::ra};
 inline constexpr std::array by_ra_or_rd = {GrowthRule::ra, GrowthRule::rd};
 
+/// On which held-out rows variants of the trees are compared after a few rounds.
+enum class RaceRows {
+  none,
+  all_parts,     ///< of each part in turn: few rows
+  the_held_out,  ///< those that stop the sum
+};
+
 /// One line of the table: how a sum of so many rows is fitted.
 struct Regime {
   Eigen::Index rows = 0;                           ///< from so many rows on, up to the next regime
@@ -26,7 +33,7 @@ struct Regime {
   bool takes_turns = false;                        ///< every fifth is held out in turn, and variants are averaged
   Eigen::Index held_out = 0;                       ///< about so many rows; 0: a fifth
   bool uses_all_parts = false;                     ///< the printed error is of all fifths, not of the one that chose
-  bool races = false;                              ///< variants are compared after a few rounds
+  RaceRows race = RaceRows::none;                  ///< on which rows variants are compared after a few rounds
   std::span<const GrowthRule> rules_of_tree = {};  ///< by which one tree beside the sum is tried; empty: by none
   Eigen::Index most_inputs_of_tree = 0;            ///< with more none is tried
   Eigen::Index most_rounds_of_tree = no_limit;     ///< and none if the sum has trees of more rounds
@@ -39,12 +46,12 @@ inline constexpr Eigen::Index enough_for_one_hold_out = 500;
 /// docs/algorithms/boosting.md and llmt/boosted.hpp have the same table, and a test compares them. docs/benchmarks.md,
 /// "Sums of trees", says on which data the numbers were chosen.
 inline constexpr std::array<Regime, 6> regimes = {{
-    {fewest_boosted_rows, 0.05, 3, 3.0, 100, true, 0, false, false, by_ra, 100},
-    {enough_for_one_hold_out, 0.05, 3, 3.0, 200, false, 0, true, false, by_ra_or_rd, 100},
-    {5000, 0.05, 5, 1.0, 50, false, 0, false, true, by_ra, 32, 200},
-    {10000, 0.07, 5, 1.0, 50, false, 0, false, true, by_ra, 32, 200},
-    {50000, 0.07, 5, 1.0, 50, false, 0, false, true},
-    {100001, 0.1, 5, 1.0, 50, false, 20000, false, true, {}, 0, 0, 250000},
+    {fewest_boosted_rows, 0.05, 3, 3.0, 100, true, 0, false, RaceRows::none, by_ra, 100},
+    {enough_for_one_hold_out, 0.05, 3, 3.0, 200, false, 0, true, RaceRows::all_parts, by_ra_or_rd, 100},
+    {5000, 0.05, 5, 1.0, 50, false, 0, false, RaceRows::the_held_out, by_ra, 32, 200},
+    {10000, 0.07, 5, 1.0, 50, false, 0, false, RaceRows::the_held_out, by_ra, 32, 200},
+    {50000, 0.07, 5, 1.0, 50, false, 0, false, RaceRows::the_held_out},
+    {100001, 0.1, 5, 1.0, 50, false, 20000, false, RaceRows::the_held_out, {}, 0, 0, 250000},
 }};
 
 /// The regime of a table, without rules of a tree for too many inputs.

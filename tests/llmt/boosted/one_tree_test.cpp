@@ -145,12 +145,14 @@ TEST(FitBoosted, TakesOneTreeWhereItIsBetter) {
   const llmt::TrainingData data = smooth(700, 10, 0.05, 5);
   const llmt::BoostResult fitted = llmt::fit_boosted(data);
   const llmt::BoostSummary& summary = fitted.summaries[0];
-  ASSERT_EQ(summary.compared.size(), 2U);
-  EXPECT_GT(summary.compared[1].share, 0.5);
-  EXPECT_LT(summary.rmse, 0.9 * summary.compared[0].rmse);
+  ASSERT_GT(summary.compared.size(), 2U);  // those of the race, then the two with all their trees
+  const llmt::BoostVariant& sum = summary.compared.end()[-2];
+  EXPECT_EQ(summary.compared.back().name, "one tree");
+  EXPECT_GT(summary.compared.back().share, 0.5);
+  EXPECT_LT(summary.rmse, 0.9 * sum.rmse);
   const llmt::TrainingData fresh = smooth(2000, 10, 0.0, 6);
   const double error = rmse(fitted.model.predict(fresh.inputs).col(0) - fresh.outputs.col(0));
-  EXPECT_LT(std::hypot(error, 0.05), 1.1 * summary.rmse);
+  EXPECT_LT(std::hypot(error, 0.05), 1.15 * summary.rmse);
   EXPECT_GT(std::hypot(error, 0.05), 0.8 * summary.rmse);
 }
 
@@ -166,8 +168,8 @@ TEST(FitBoosted, SaysTheErrorOfAllRowsWhereOneTreeIsBesideASumOfSome) {
   }
   const llmt::BoostSummary& summary = fitted.summaries[0];
   EXPECT_EQ(summary.held_out, 700);
-  ASSERT_GT(summary.compared[1].share, 0.0);
-  ASSERT_GT(summary.compared[0].share, 0.0);
+  ASSERT_GT(summary.compared.back().share, 0.0);
+  ASSERT_GT(summary.compared.end()[-2].share, 0.0);
   EXPECT_NEAR(summary.train_rmse, rmse(fitted.model.predict(data.inputs).col(0) - data.outputs.col(0)), 1e-5);
 }
 
@@ -195,12 +197,12 @@ TEST(OneTree, IsGrownByTheRuleOfTheSmallerError) {
 TEST(FitBoosted, TriesOneTreeOfManyRowsWhereBoostingStopsEarly) {
   const llmt::BoostResult fitted = llmt::fit_boosted(smooth(5500, 4, 1.0, 8));
   const llmt::BoostSummary& summary = fitted.summaries[0];
-  ASSERT_EQ(summary.compared.size(), 6U);  // four after 50 rounds, and the last two
-  EXPECT_EQ(summary.compared[5].name, "one tree");
-  EXPECT_LT(summary.compared[5].rmse, summary.compared[4].rmse);
+  ASSERT_EQ(summary.compared.size(), 7U);  // five after 50 rounds, and the last two
+  EXPECT_EQ(summary.compared[6].name, "one tree");
+  EXPECT_LT(summary.compared[6].rmse, summary.compared[5].rmse);
   EXPECT_EQ(summary.variant, "blend");
-  EXPECT_NEAR(summary.compared[4].share + summary.compared[5].share, 1.0, 1e-12);
-  for (int k = 0; k < 4; ++k) EXPECT_EQ(summary.compared[k].share, 0.0);
+  EXPECT_NEAR(summary.compared[5].share + summary.compared[6].share, 1.0, 1e-12);
+  for (int k = 0; k < 5; ++k) EXPECT_EQ(summary.compared[k].share, 0.0);
 }
 
 TEST(FitBoosted, TakesNoTreeWhereTheTruthHasSteps) {
@@ -215,8 +217,9 @@ TEST(FitBoosted, TakesNoTreeWhereTheTruthHasSteps) {
   }
   const llmt::BoostSummary summary = llmt::fit_boosted(data).summaries[0];
   EXPECT_EQ(summary.variant, "symmetric");
-  ASSERT_EQ(summary.compared.size(), 2U);
-  EXPECT_EQ(summary.compared[1].share, 0.0);
+  ASSERT_GT(summary.compared.size(), 2U);
+  EXPECT_EQ(summary.compared.back().name, "one tree");
+  EXPECT_EQ(summary.compared.back().share, 0.0);
 }
 
 }  // namespace

@@ -32,6 +32,11 @@ std::string tree_in_words(const llmt::Regime& regime) {
   return fmt::format("{}, to {} inputs{}", rules, regime.most_inputs_of_tree, trees);
 }
 
+std::string race_in_words(llmt::RaceRows rows) {
+  if (rows == llmt::RaceRows::none) return "no";
+  return rows == llmt::RaceRows::all_parts ? "on all fifths" : "yes";
+}
+
 std::vector<std::string> table() {
   std::vector<std::string> lines = {
       "| rows from | rate | slopes | c | patience | held out | race | one tree | splits from |",
@@ -43,7 +48,7 @@ std::vector<std::string> table() {
                                                       : "a fifth";
     const std::string searched = regime.searched < llmt::no_limit ? with_spaces(regime.searched) + " rows" : "all rows";
     lines.push_back(fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |", with_spaces(regime.rows), regime.rate,
-                                regime.slopes, regime.ridge, regime.patience, apart, regime.races ? "yes" : "no",
+                                regime.slopes, regime.ridge, regime.patience, apart, race_in_words(regime.race),
                                 tree_in_words(regime), searched));
   }
   return lines;
