@@ -154,7 +154,8 @@ Average stopped(const BoostingData& data, const Eigen::VectorXd& output, const S
   Work part(work, (uses_all_parts ? 0.3 : 1.0) * work.left());
   result = with_one_tree(data, output, std::move(result), plan.rounds.max_threads, part);
   if (!uses_all_parts) return result;
-  const Eigen::Vector2d shares(result.variants.front().share, result.tree ? result.variants.back().share : 0.0);
+  const double of_sum = result.variants[plan.compared.size()].share;  // behind those of the race
+  const Eigen::Vector2d shares(of_sum, result.tree ? result.variants.back().share : 0.0);
   std::optional<Eigen::VectorXd> others =
       residuals_of_other_parts(data, output, {plan, trees, shares, result.tree}, options.seed, work);
   if (others) use_all_parts(data, *std::move(others), result, summary);

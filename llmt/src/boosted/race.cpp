@@ -192,8 +192,9 @@ SumPlan race(const BoostingData& data, const Eigen::VectorXd& output, const Roun
   if (best.rounds.tree.softness > 0.0) {
     SumPlan paired = with_pairs_of(most_soft_paired, best);
     if (paired.rows.features.size() > best.rows.features.size()) {
-      take_if(std::move(paired),
-              [](const Raced& one, const Raced& than) { return one.rmse < allowed_at_first * than.rmse; });
+      take_if(std::move(paired), [=](const Raced& one, const Raced& than) {
+        return are_few ? is_proven(one, than) : one.rmse < allowed_at_first * than.rmse;
+      });
     }
   }
   if (are_few && best.name != first.name) {  // a short race judges the start, and long ones of few rows are cheap
