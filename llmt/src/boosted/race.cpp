@@ -11,10 +11,11 @@ namespace {
 // docs/benchmarks.md, "Sums of trees", says on which tables these were chosen.
 constexpr int race_rounds = 50;
 constexpr double race_rate = 0.3;
-constexpr std::size_t most_paired = 4;         // inputs whose sums and differences are tried
-constexpr std::size_t most_soft_paired = 6;    // and in soft trees, where these won
-constexpr double allowed_at_first = 1.1;       // of the error: further directions pay only after some hundred rounds
-constexpr double looked_at_with_pairs = 16.0;  // features, at least
+constexpr std::size_t most_paired = 4;       // inputs whose sums and differences are tried
+constexpr std::size_t most_soft_paired = 6;  // and in soft trees, where these won
+constexpr double allowed_at_first = 1.1;     // of the error: further directions pay only after some hundred rounds
+constexpr double fewest_looked_at = 8.0;     // features with pairs: half of them within these bounds
+constexpr double most_looked_at = 16.0;
 constexpr const char* of_pairs = " with pairs";
 constexpr double free_margin = 0.25;  // of 1 / sqrt(held-out rows): by how much a variant must be better
 constexpr double soft_margin = 1.0;
@@ -161,8 +162,9 @@ SumPlan race(const BoostingData& data, const Eigen::VectorXd& output, const Roun
     if (inputs.size() < 2) return plan;
     if (!plan.name.ends_with(of_pairs)) plan.name += of_pairs;
     plan.rows = with_pairs(data, inputs);
-    const double looked_at = std::max(looked_at_with_pairs, static_cast<double>(features) / 4.0);
-    plan.rounds.tree.columns = std::min(1.0, looked_at / static_cast<double>(plan.rows.features.size()));
+    const auto all = static_cast<double>(plan.rows.features.size());
+    const double half = std::clamp(0.5 * all, fewest_looked_at, most_looked_at);
+    plan.rounds.tree.columns = std::min(1.0, std::max(half, static_cast<double>(features) / 4.0) / all);
     return plan;
   };
   const auto take_if = [&](SumPlan variant, const auto& is_better) {
