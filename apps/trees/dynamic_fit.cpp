@@ -99,8 +99,8 @@ void add_dynamic_options(CLI::App& command, DynamicArguments& arguments) {
       .add_option(
           "--lags", arguments.lags,
           "Learn a system that moves: the rows are one record in time, and the model looks back. auto: found on "
-          "held-out stretches; or lags in rows as y:1-3,u:0-4, of targets from 1 on, y:+1-3 for a target that adds up its "
-          "changes. llmt simulate runs it")
+          "held-out stretches; or lags in rows as y:1-3,u:0-4, of targets from 1 on, y:+1-3 for a target that adds up "
+          "its changes. llmt simulate runs it")
       ->type_name("LAGS");
   command.add_option("--time", arguments.time, "With --lags: the times of the rows, at equal steps [1 each]")
       ->type_name("COLUMN");

@@ -152,10 +152,10 @@ std::string signals_text(const SignalsSummary& summary, std::size_t width) {
   if (!summary.table.empty()) lines.push_back(fmt::format("Written to {}.", summary.table));
   std::string text;
   for (const std::string& line : lines) text += wrapped(line, width, 2) + "\n";
-  text +=
-      "\n" +
-      wrapped("Noise, as standard deviations, estimated from frequencies of four times the cutoff and more:", width, 2) +
-      "\n" + table_of_noise(summary, width);
+  text += "\n" +
+          wrapped("Noise, as standard deviations, estimated from frequencies of four times the cutoff and more:", width,
+                  2) +
+          "\n" + table_of_noise(summary, width);
   return text;
 }
 

@@ -49,9 +49,9 @@ void for_each_field(Options& options, Visitor&& visit) {
   visit("mean_of_few", mean_of_few);
 }
 
-/// A variant of the trees that was compared on held-out rows: with all its trees, or in a race after 50 rounds, of fewer
-/// than 5000 rows on all fifths. If one tree is tried after a race, the sum with all its trees, on the rows that stopped
-/// it, and the one tree come last.
+/// A variant of the trees that was compared on held-out rows: with all its trees, or in a race after 50 rounds, of
+/// fewer than 5000 rows on all fifths. If one tree is tried after a race, the sum with all its trees, on the rows that
+/// stopped it, and the one tree come last.
 struct BoostVariant {
   std::string name;  ///< "symmetric", "free", "symmetric with constants", "soft with pairs", "one tree", ...
   double rmse = 0.0;
