@@ -15,14 +15,31 @@ constexpr double squares_of_binomials = 12870.0;
 // Of white noise that is differenced so, samples for one independent square: mean^2 by mean square of sin^16.
 constexpr double correlated = 1.81;
 
+// Sums of `count` consecutive samples, by doubling: a million rows far above the cutoff have means over hundreds.
+Eigen::VectorXd sums_of(const Eigen::VectorXd& samples, Eigen::Index count) {
+  const Eigen::Index n = samples.size() - count + 1;
+  Eigen::VectorXd sums = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd doubled = samples;  // sums of `length` samples
+  Eigen::Index begin = 0;
+  for (Eigen::Index length = 1; length <= count; length *= 2) {
+    if ((count & length) != 0) {
+      sums += doubled.segment(begin, n);
+      begin += length;
+    }
+    const Eigen::Index next = doubled.size() - length;
+    if (next <= 0) break;
+    doubled = (doubled.head(next) + doubled.tail(next)).eval();
+  }
+  return sums;
+}
+
 // Differences of order 8 of means of `stride` consecutive samples, scaled to the variance of white noise.
 Eigen::VectorXd differences_of(const Eigen::VectorXd& samples, Eigen::Index stride) {
   const Eigen::Index n = samples.size() - 9 * stride + 1;
   if (n <= 0) return {};
-  Eigen::VectorXd means = Eigen::VectorXd::Zero(samples.size() - stride + 1);
-  for (Eigen::Index k = 0; k < stride; ++k) means += samples.segment(k, means.size());
+  const Eigen::VectorXd sums = sums_of(samples, stride);
   Eigen::VectorXd differences = Eigen::VectorXd::Zero(n);
-  for (Eigen::Index k = 0; k <= 8; ++k) differences += binomials[k] * means.segment(k * stride, n);
+  for (Eigen::Index k = 0; k <= 8; ++k) differences += binomials[k] * sums.segment(k * stride, n);
   return differences / std::sqrt(squares_of_binomials * static_cast<double>(stride));
 }
 
