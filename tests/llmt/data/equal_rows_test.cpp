@@ -16,6 +16,7 @@
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
 #include "oracles/oracles.hpp"
+#include "study.hpp"
 
 namespace {
 
@@ -228,7 +229,8 @@ Log log_of_states(double jitter, bool has_time, std::uint64_t seed) {
 
 TEST(EqualRows, ThatDifferInTheLastDigitsAreRepeats) {
   for (const bool has_time : {false, true}) {
-    for (const double jitter : {0.0, 1e-15, 1e-12, 1e-9, 1e-7}) {
+    for (const double jitter : {1e-15, 1e-7, 0.0, 1e-12, 1e-9}) {
+      if (sampled(false, jitter != 1e-15 && jitter != 1e-7)) continue;
       const Log log = log_of_states(jitter, has_time, 5);
       const llmt::FitResult result = llmt::fit(log.x, log.y);
       EXPECT_TRUE(result.summary.repeats) << jitter;

@@ -6,6 +6,7 @@
 #include "discovery/answer/findings.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/random.hpp"
+#include "study.hpp"
 
 namespace law_terms_test {
 namespace {
@@ -83,11 +84,11 @@ TEST(LawTerms, HiddenOnesAreNamedWithTheirConstants) {
       {"sign_product", "v,x", [](double v, double, double x, double) { return 0.1 * sign(v) * x; }, {0.1}},
       {"sign_product", "v,q", [](double v, double q, double, double) { return 0.3 * sign(v) * std::abs(q); }, {0.3}},
   };
-  constexpr int seeds = 2;
+  const int seeds = sampled(2, 1);
   for (const Law& law : laws) {
     int right = 0;
     const std::string name = std::string(law.family) + " " + law.location;
-    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(seeds); ++seed) {
       const Missing missing = missing_from(seed, 0.03, law.hidden);
       if (missing.found.size() != 1 || missing.found[0].family != law.family ||
           missing.found[0].location != law.location) {
@@ -122,10 +123,10 @@ TEST(LawTerms, SimplerTermsKeepTheirNames) {
       {"saturation", "x", [](double, double, double x, double) { return x / (1.5 + x); }, {1.0, 1.5}},
       {"product", "v,x", [](double v, double, double x, double) { return 0.05 * v * x; }, {0.05}},
   };
-  constexpr int seeds = 2;
+  const int seeds = sampled(2, 1);
   for (const Law& law : laws) {
     int right = 0;
-    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(seeds); ++seed) {
       const Missing missing = missing_from(seed, 0.03, law.hidden);
       right += missing.found.size() == 1 && missing.found[0].family == law.family && missing.found[0].confirmed ? 1 : 0;
     }
@@ -135,7 +136,8 @@ TEST(LawTerms, SimplerTermsKeepTheirNames) {
 
 // Coulomb's and viscous friction are two terms, each with its coefficient.
 TEST(LawTerms, CoulombAndViscousFrictionAreTwoTerms) {
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+  const std::uint64_t seeds = sampled(4, 1);
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
     const Missing missing =
         missing_from(seed, 0.03, [](double v, double, double, double) { return 0.4 * sign(v) + 0.3 * v; });
     ASSERT_EQ(missing.found.size(), 2U);

@@ -12,6 +12,7 @@
 #include "discovery/recording/recording.hpp"
 #include "filtered_log.hpp"
 #include "llmt/discovery/search.hpp"
+#include "study.hpp"
 
 namespace log_test {
 namespace {
@@ -94,7 +95,8 @@ TEST(FilteredRows, AJumpBetweenRowsCountsWhereItIs) {
 TEST(FilteredRows, ACompleteModelWithDryFrictionLacksNothing) {
   const Model model{.dry = 2.0};
   const auto torque = [&](double t) { return model.torque(motion(t)); };
-  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+  const std::uint64_t seeds = sampled(3, 1);
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
     const LogRows rows = rows_of_log(seed, model, 0.05, torque);
     const Missing missing = missing_from(rows);
     std::string found;
@@ -195,7 +197,8 @@ TEST(Regimes, AnEffectBeyondAThresholdIsNamedWithIt) {
     const Eigen::Vector3d x = motion(t);
     return model.torque(x) + (x(0) > threshold ? 0.5 * x(1) : 0.0);
   };
-  for (const std::uint64_t seed : {1u, 2u}) {
+  const std::uint64_t seeds = sampled(2, 1);
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
     const Missing missing = missing_from(rows_of_log(seed, model, 0.05, torque));
     EXPECT_EQ(missing.answer, Answer::named) << seed << to_string(missing.answer);
     ASSERT_EQ(missing.found.size(), 1u);

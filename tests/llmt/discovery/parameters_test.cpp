@@ -5,6 +5,7 @@
 #include "discovery/answer/findings.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/random.hpp"
+#include "study.hpp"
 
 namespace llmt::discovery {
 namespace parameters_test {
@@ -71,8 +72,8 @@ void expect_near(const FittedParameter& fitted, double change) {
 
 TEST(Parameters, AloneAreParametersAndNoTerms) {
   int only = 0;
-  constexpr int seeds = 10;
-  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+  const int seeds = sampled(10, 3);
+  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(seeds); ++seed) {
     const Cart own = cart(seed, 3.5, 1.4, 0.0, 0.05);
     const Missing missing = missing_from(own, own.nominal(3.0, 1.0));
     if (missing.answer != Answer::parameters_only) continue;
@@ -95,8 +96,9 @@ TEST(Parameters, AloneAreParametersAndNoTerms) {
 
 TEST(Parameters, ThatAreRightAreNotSaidToBeOff) {
   // The rate is 0.3 % for the parameters and for the terms: no alarm in 20 draws has a probability of 89 %.
+  const std::uint64_t seeds = sampled(20, 5);
   int alarms = 0;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
     const Cart own = cart(seed, 3.0, 1.0, 0.0, 0.05);
     if (missing_from(own, own.nominal(3.0, 1.0)).answer != Answer::nothing_missing) ++alarms;
   }
@@ -105,8 +107,8 @@ TEST(Parameters, ThatAreRightAreNotSaidToBeOff) {
 
 TEST(Parameters, BesideAMissingEffectBothAreRight) {
   int named = 0;
-  constexpr int seeds = 10;
-  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+  const int seeds = sampled(10, 3);
+  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(seeds); ++seed) {
     const Cart own = cart(seed, 3.5, 1.4, 1.5, 0.05);
     const Missing missing = missing_from(own, own.nominal(3.0, 1.0));
     if (missing.found.size() != 1 || missing.found[0].family != "signed_square") continue;
@@ -120,13 +122,13 @@ TEST(Parameters, BesideAMissingEffectBothAreRight) {
     EXPECT_LT(missing.gaps[0].after, missing.gaps[0].before);
     EXPECT_LT(missing.gaps[0].before, missing.gaps[0].nominal);
   }
-  EXPECT_GE(named, seeds * 9 / 10);
+  EXPECT_GE(10 * named, 9 * seeds);
 }
 
 TEST(Parameters, FittedBySomebodyElseWithoutTheEffectGoBack) {
   int named = 0;
-  constexpr int seeds = 10;
-  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+  const int seeds = sampled(10, 3);
+  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(seeds); ++seed) {
     const Cart own = cart(seed, 3.0, 1.0, 1.5, 0.05);
     // What a fit of the parameters alone says: least squares on the same rows.
     Eigen::MatrixXd by(own.inputs.values.rows(), 2);
@@ -140,7 +142,7 @@ TEST(Parameters, FittedBySomebodyElseWithoutTheEffectGoBack) {
     expect_near(missing.fitted_parameters[1], 1.0 - fit(1));
     EXPECT_TRUE(missing.fitted_parameters[1].changed);
   }
-  EXPECT_GE(named, seeds * 9 / 10);
+  EXPECT_GE(10 * named, 9 * seeds);
 }
 
 TEST(Parameters, ThatRowsCannotTellApartAreMergedByName) {

@@ -8,6 +8,7 @@
 
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/random.hpp"
+#include "study.hpp"
 
 namespace {
 
@@ -85,10 +86,10 @@ std::vector<Expected> hidden_terms() {
 }
 
 TEST(StandardTerms, HiddenOnesAreNamedWithTheirConstants) {
-  constexpr int seeds = 2;
+  const int seeds = sampled(2, 1);
   for (const Expected& expected : hidden_terms()) {
     int right = 0;
-    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(seeds); ++seed) {
       const Missing missing = missing_from(bench(seed, 200, 0.05, expected.hidden));
       const std::string name = std::string(expected.family) + " " + expected.location;
       if (missing.found.size() != 1 || missing.found[0].family != expected.family ||
@@ -115,9 +116,9 @@ TEST(StandardTerms, HiddenOnesAreNamedWithTheirConstants) {
 
 TEST(StandardTerms, NoiseHasNone) {
   for (const Eigen::Index rows : {30, 200}) {
-    constexpr int seeds = 30;
+    const int seeds = sampled(30, 8);
     int alarms = 0;
-    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(seeds); ++seed) {
       const Missing missing =
           missing_from(bench(seed * 31, rows, 0.05, [](double, double, double, double) { return 0.0; }));
       alarms += missing.verdict.answer != Answer::nothing_missing ? 1 : 0;
@@ -140,8 +141,8 @@ TEST(StandardTerms, WhatTheyDoNotHoldIsNotConfirmed) {
   };
   for (std::size_t k = 0; k < hidden.size(); ++k) {
     int unsure = 0;
-    constexpr int seeds = 3;
-    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const int seeds = sampled(3, 1);
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(seeds); ++seed) {
       const Missing missing = missing_from(bench(seed, 200, 0.05, hidden[k]));
       unsure += std::ranges::none_of(missing.found, &FoundTerm::confirmed) ? 1 : 0;
       // "Named" would say that the names are sure.
@@ -248,10 +249,10 @@ Eigen::MatrixXd plate(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& valu
 }
 
 TEST(FindMissing, FitsTheSimulationTogetherWithItsTerms) {
-  constexpr int seeds = 40;
+  const int seeds = sampled(40, 12);
   int named = 0;
   Eigen::Vector3i covered = Eigen::Vector3i::Zero();
-  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(seeds); ++seed) {
     llmt::Random random(seed);
     Inputs inputs{{"t", "power", "draught"}, Eigen::MatrixXd(120, 3)};
     for (Eigen::Index i = 0; i < 120; ++i) {

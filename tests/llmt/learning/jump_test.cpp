@@ -4,6 +4,7 @@
 
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
+#include "study.hpp"
 
 namespace {
 
@@ -21,8 +22,9 @@ const Truth truths[] = {
 };
 
 TEST(JumpingTruth, DefaultIsNeverMuchWorseThanTheCrispTree) {
+  const std::uint64_t seeds = sampled(3, 1);
   for (const Truth& truth : truths) {
-    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
       const Eigen::MatrixXd x = oracle::uniform(800, 2, seed);
       const Eigen::MatrixXd test = oracle::uniform(4000, 2, 1000 + seed);
       llmt::Random random(seed);
@@ -46,7 +48,8 @@ TEST(JumpingTruth, DefaultIsNeverMuchWorseThanTheCrispTree) {
 // Blends on both sides of a jump, which all splits blended or none would lose. Next to the jump its place is not known
 // better than the gap between two rows, so errors are taken a little off it.
 TEST(JumpingTruth, BlendKeepsTheJump) {
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+  const std::uint64_t seeds = sampled(3, 1);
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
     const Eigen::MatrixXd x = oracle::uniform(1500, 3, seed);
     const Eigen::MatrixXd test = oracle::uniform(4000, 3, 1000 + seed);
     const auto truth = [](const Eigen::MatrixXd& at) {
@@ -104,8 +107,9 @@ TEST(JumpingTruth, SmoothAndKinkedTruthsHaveNoLargeJumps) {
 
 // Among many candidates some is a little better on noise; that is not worth leaving the linear model for.
 TEST(NoisyTruth, NothingToFindGivesLeastSquares) {
+  const int seeds = sampled(20, 10);
   int trees = 0;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(seeds); ++seed) {
     const Eigen::MatrixXd x = oracle::uniform(300, 3, seed);
     llmt::Random random(100 + seed);
     Eigen::VectorXd y = x.col(0) - 0.5 * x.col(1);
@@ -114,7 +118,7 @@ TEST(NoisyTruth, NothingToFindGivesLeastSquares) {
     }
     trees += llmt::fit(x, y).summary.partitions[0].leaves > 1 ? 1 : 0;
   }
-  EXPECT_LE(trees, 2);
+  EXPECT_LE(10 * trees, seeds);
 }
 
 }  // namespace

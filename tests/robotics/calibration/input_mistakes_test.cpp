@@ -10,6 +10,7 @@
 #include "llmt/robotics/likely_mistake.hpp"
 #include "llmt/robotics/orientation.hpp"
 #include "robotics/observations.hpp"
+#include "study.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -68,8 +69,12 @@ TEST(LikelyMistake, TheOrderOfAnglesAndQuaternionsIsNamed) {
     return found ? found->name : std::string();
   };
   const std::vector<std::string> orders = {"xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
-  for (const std::string& written : orders) {
-    for (const std::string& read : orders) {
+  for (std::size_t of_written = 0; of_written < orders.size(); ++of_written) {
+    // Of the orders that are read, the gate takes one each: two are right, four are not.
+    const std::size_t every = sampled(1, 6);
+    for (std::size_t of_read = every > 1 ? (of_written * 5 + 2) % 6 : 0; of_read < orders.size(); of_read += every) {
+      const std::string& written = orders[of_written];
+      const std::string& read = orders[of_read];
       const std::string expected = written == read ? "" : "orientation_intrinsic_" + written;
       EXPECT_EQ(said("intrinsic_" + written, "intrinsic_" + read), expected) << written << " read as " << read;
     }

@@ -9,6 +9,7 @@
 #include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
+#include "study.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -70,6 +71,7 @@ TEST(Compliance, HasOneNameThroughGravityPayloadAndTorque) {
         // Without masses, payloads and torques at once the torque's noise stands against six moments a joint: the same
         // cause is then put together from both, which this test does not ask for.
         if (!masses_known && payload_runs && sign != 0.0) continue;
+        if (sampled(false, sign < 0.0)) continue;
         const Discovery found =
             discover(described(masses_known), measured(payload_runs, sign, 3), {}, {.correct = false});
         EXPECT_EQ(found.answer, discovery::Answer::named);
