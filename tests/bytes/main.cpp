@@ -1,7 +1,8 @@
 // The witness of bytes: `bytes_witness check|renew MANIFEST FOLDER [PART...]`.
 //
-// check makes the results of the parts (all, if none is named) and compares them with the manifest's. renew writes the
-// manifest anew, with the fingerprint of this build.
+// check makes the results of the parts (all, if none is named) and compares them with the manifest's. A case is made at
+// 1 or at 8 threads, in a study (study.hpp) at both. renew makes them at both and writes the manifest anew, with the
+// fingerprint of this build.
 #include <cstdio>
 #include <filesystem>
 #include <sstream>
@@ -9,6 +10,7 @@
 
 #include "bytes/cases.hpp"
 #include "llmt/files.hpp"
+#include "study.hpp"
 
 namespace bytes {
 namespace {
@@ -29,8 +31,9 @@ const std::map<std::string, Part>& parts() {
 
 std::string part_of(const std::string& name) { return name.substr(0, name.find('/')); }
 
-Results make_results(const std::vector<std::string>& names, const std::string& folder) {
+Results make_results(const std::vector<std::string>& names, const std::string& folder, bool at_both_counts) {
   Results results;
+  results.at_both_counts = at_both_counts;
   for (const std::string& name : names) {
     const auto part = parts().find(name);
     if (part == parts().end()) throw std::runtime_error("no part is called " + name);
@@ -85,8 +88,9 @@ int run(const std::vector<std::string>& arguments) {
   if (names.empty()) {
     for (const auto& [name, unused] : parts()) names.push_back(name);
   }
-  const Results got = make_results(names, arguments[2]);
-  if (arguments[0] == "renew") {
+  const bool is_renewal = arguments[0] == "renew";
+  const Results got = make_results(names, arguments[2], is_renewal || sampled(true, false));
+  if (is_renewal) {
     write_manifest(arguments[1], got);
     std::printf("%zu cases written to %s\n", got.size(), arguments[1].c_str());
     return 0;
