@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from study import sampled
 
 from llmt.export import to_python
 
@@ -217,7 +218,8 @@ def fit(name, folder):
     _write(folder / "table.csv", {**columns, **outputs})
     path = folder / "model.json"
     targets = ",".join('"' + output.replace('"', '""') + '"' if '"' in output else output for output in outputs)
-    run("fit", folder / "table.csv", "-t", targets, "-o", path, "--threads", 1, "--no-intervals", *arguments)
+    usual = ["--threads", 1, "--no-intervals", "--cv", sampled(10, 3)]
+    run("fit", folder / "table.csv", "-t", targets, "-o", path, *usual, *arguments)
     if "--readable" in arguments:
         path = folder / "model.readable.json"
     model = json.loads(path.read_text(encoding="utf-8"))
@@ -225,10 +227,12 @@ def fit(name, folder):
     return Fitted(name, model, str(path), rows, predictions(path, model, rows, folder), kinds)
 
 
+made = {}  # by all files of tests of a process
+
+
 @pytest.fixture(scope="session")
 def fitted(tmp_path_factory):
     """Makes the model of a name once, with its rows and predictions."""
-    made = {}
 
     def get(name):
         if name not in made:

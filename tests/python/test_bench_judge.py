@@ -9,6 +9,7 @@ import types
 
 import numpy as np
 import pytest
+from study import sampled
 
 pytest.importorskip("scipy")
 from scipy import integrate  # noqa: E402
@@ -31,7 +32,7 @@ def rms(x):
 
 
 def test_a_seed_gives_the_same_log_again_and_another_seed_another():
-    for seed in (3, 12, 40):
+    for seed in sampled((3, 12, 40), (3, 12)):
         first, again = (generate.run(generate.case(seed), 1) for _ in range(2))
         assert all(np.array_equal(first.log[name], again.log[name]) for name in first.log)
     assert not np.array_equal(generate.run(generate.case(8), 1).log["u"][:100], generate.run(generate.case(16), 1).log["u"][:100])
@@ -102,7 +103,7 @@ IN_LOOPS = (3, 19, 54, 71, 111)  # one and two axes, with and without dry fricti
 
 
 def test_a_loop_obeys_the_equation_of_motion_and_follows_its_reference():
-    for case in map(generate.case, IN_LOOPS):
+    for case in map(generate.case, sampled(IN_LOOPS, IN_LOOPS[:2])):
         run = generate.run(case, 1)
         assert run.in_loop
         model = structure.output(case.machine, run.signals, case.parameters) + case.hidden.force(run.signals, run.simulated)
@@ -120,7 +121,7 @@ def test_a_loop_obeys_the_equation_of_motion_and_follows_its_reference():
 
 
 def test_half_the_step_of_integration_gives_the_same_signals():
-    for case in map(generate.case, (4, 12, 20, 28, 60, 76, *IN_LOOPS[:2])):
+    for case in map(generate.case, sampled((4, 12, 20, 28, 60, 76, *IN_LOOPS[:2]), (4, 28, IN_LOOPS[0]))):
         coarse, fine = generate.run(case, 1), generate.run(case, 1, 2 * draw.FINER)
         for name in case.machine.coordinates:
             # In a loop steps of the encoder fall otherwise.

@@ -25,7 +25,8 @@ WALK = textwrap.dedent("""
     random = np.random.default_rng(3)
     X = random.uniform(0, 1, (60, 2))
     y = X[:, 0] + (X[:, 1] > 0.5)
-    few = {"max_iter": 10} if sys.argv[1].startswith("Boosted") else {}
+    is_sum = sys.argv[1].startswith("Boosted")
+    few = {"max_iter": 10} if is_sum else {"cv": 2}
     calls = wrong = 0
 
 
@@ -54,13 +55,13 @@ WALK = textwrap.dedent("""
     parameters = [name for name in inspect.signature(Estimator.__init__).parameters if name != "self"]
     for name, number in itertools.product(parameters, NUMBERS):
         expect(f"{name}={number}", lambda: Estimator(**{**few, name: number}).fit(X, y).predict(X))
-        if not few:
+        if not is_sum:
             expect(f"{name}={number}, partial_fit", lambda: Estimator(**{name: number}).partial_fit(X, y).predict(X))
             start = lambda: distributed.start(["a"], "y", estimator=Estimator(**{name: number}))
             expect(f"{name}={number}, start", lambda: len(start()))
 
     usual = Estimator(**few)
-    learn = [usual.fit] + ([] if few else [Estimator().partial_fit, Estimator(loss="tukey").fit])
+    learn = [usual.fit] + ([] if is_sum else [Estimator().partial_fit, Estimator(loss="tukey", **few).fit])
     for number, fit in itertools.product(NUMBERS, learn):
         ones = np.ones(len(y))
         for what, arguments in {

@@ -18,15 +18,22 @@ def arm():
     return robotics.robot(Path(__file__).parents[2] / "docs" / "samples" / "arm.yaml")
 
 
+@pytest.fixture(scope="module")
+def tables(arm, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tables")
+    simulated = robotics.simulate(arm, 50_000)
+    simulated.to_csv(folder / "all.csv", index=False)
+    simulated[POINT].to_csv(folder / "points.csv", index=False)
+    return {"all": folder / "all.csv", "points": folder / "points.csv"}
+
+
 def _threads():
     return len(os.listdir("/proc/self/task"))
 
 
 @pytest.mark.parametrize("task", ["compensate", "compensate without joints", "predict", "simulate"])
-def test_ctrl_c_ends_long_tables(arm, task, tmp_path):
-    table = tmp_path / "table.csv"
-    simulated = robotics.simulate(arm, 50_000)
-    (simulated[POINT] if task == "compensate without joints" else simulated).to_csv(table, index=False)
+def test_ctrl_c_ends_long_tables(arm, task, tables):
+    table = tables["points" if task == "compensate without joints" else "all"]
     call = {"predict": robotics.predict, "simulate": robotics.simulate}.get(task, robotics.compensate)
     before = _threads()
     for _ in range(3):

@@ -20,10 +20,10 @@ def test_the_command_line_writes_the_same_bytes_and_errors(tmp_path):
     pandas = pytest.importorskip("pandas")
     frame = pandas.read_csv(SAMPLE).head(240)  # of which the taught tree is taken
     frame.to_csv(tmp_path / "rows.csv", index=False)
-    options = ["--target", "cop", "--teach", "--readable", "--json", "-o", tmp_path / "model.json"]
+    options = ["--target", "cop", "--teach", "--readable", "--json", "--cv", "3", "-o", tmp_path / "model.json"]
     command = [PROGRAM, "fit", tmp_path / "rows.csv", *options]
     printed = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-    fitted = LocalLinearTreeRegressor(teach=True, readable=True).fit(frame.drop(columns="cop"), frame["cop"])
+    fitted = LocalLinearTreeRegressor(teach=True, readable=True, cv=3).fit(frame.drop(columns="cop"), frame["cop"])
     assert fitted.accurate_model_.to_json() == (tmp_path / "model.json").read_text()
     assert fitted.to_json() == (tmp_path / "model.readable.json").read_text()
     assert fitted.summary_["teaching"] == printed["teaching"]
@@ -33,8 +33,8 @@ def test_the_command_line_writes_the_same_bytes_and_errors(tmp_path):
 def test_a_weight_is_a_number_of_copies():
     X, y = stepped(120)
     weights = np.random.default_rng(1).integers(0, 4, len(y))
-    repeated = LocalLinearTreeRegressor(teach=True).fit(np.repeat(X, weights, axis=0), np.repeat(y, weights))
-    weighted = LocalLinearTreeRegressor(teach=True).fit(X, y, sample_weight=weights)
+    repeated = LocalLinearTreeRegressor(teach=True, cv=3).fit(np.repeat(X, weights, axis=0), np.repeat(y, weights))
+    weighted = LocalLinearTreeRegressor(teach=True, cv=3).fit(X, y, sample_weight=weights)
     assert weighted.to_json() == repeated.to_json()
     assert weighted.summary_["teaching"] == repeated.summary_["teaching"]
 
