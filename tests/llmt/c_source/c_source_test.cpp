@@ -21,7 +21,7 @@ using random_models::Kind;
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 // Reads rows of doubles, writes rows of doubles.
-const char* const driver = R"(#include <stdio.h>
+const char* const main_of_c = R"(#include <stdio.h>
 #include "tree.h"
 int main(void) {
   double x[%INPUTS%], y[%OUTPUTS%];
@@ -44,7 +44,7 @@ class CSource : public oracle::CompiledC {
   // What the exported model says of rows.
   template <class AnyModel>
   Eigen::MatrixXd run(const AnyModel& model, const Eigen::MatrixXd& x) const {
-    const std::string with_inputs = replaced(driver, "%INPUTS%", std::to_string(model.num_inputs()));
+    const std::string with_inputs = replaced(main_of_c, "%INPUTS%", std::to_string(model.num_inputs()));
     const std::string main_text = replaced(with_inputs, "%OUTPUTS%", std::to_string(model.num_outputs()));
     return run_c(llmt::to_c(model, "tree", "tree.h"), "tree", main_text, x, model.num_outputs());
   }

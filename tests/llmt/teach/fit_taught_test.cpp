@@ -191,7 +191,7 @@ TEST(MadeRows, HaveCoordinatesOfARowAndOfOneOfItsNearest) {
 }
 
 // Missing values, a category, two outputs.
-llmt::TrainingData mixed(Eigen::Index rows) {
+llmt::TrainingData mixed_rows(Eigen::Index rows) {
   llmt::TrainingData data = rows_of_wave(rows, 0.1, 5);
   llmt::Random random(6);
   data.inputs.conservativeResize(Eigen::NoChange, 3);
@@ -206,7 +206,7 @@ llmt::TrainingData mixed(Eigen::Index rows) {
 }
 
 TEST(Teaching, IsTheSameToTheByteForAnyNumberOfThreads) {
-  const llmt::TrainingData data = mixed(150);
+  const llmt::TrainingData data = mixed_rows(150);
   std::set<std::string> texts;
   for (const int threads : {1, 3}) {
     const llmt::TaughtResult taught = llmt::fit_taught(data, {.max_threads = threads});
