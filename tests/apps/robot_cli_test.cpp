@@ -5,7 +5,6 @@
 
 #include "apps/programs.hpp"
 #include "llmt/csv.hpp"
-#include "study.hpp"
 
 namespace {
 
@@ -17,7 +16,6 @@ using program::robot_program;
 const std::string robots = LLMT_ROBOTS;
 
 TEST(RobotProgram, PaperReproducesTheComparableRows) {
-  if (sampled(false, true)) GTEST_SKIP() << "a whole study; the gate has the one of the next test";
   const Folder folder;
   const Outcome outcome = folder.run(robot_program + " paper --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;

@@ -88,45 +88,90 @@ TEST(CrossValidation, PredictsEveryStretchByAFitOfTheOthers) {
   }
 }
 
+double nats(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, double independent_share) {
+  return advantage(found, other, Eigen::VectorXd::Ones(1), independent_share).log_likelihood;
+}
+
 TEST(CrossValidation, LikelihoodsAreThoseOfNormalNoise) {
   const Eigen::MatrixXd small = Eigen::MatrixXd::Constant(100, 1, 1.0);
   Eigen::MatrixXd large = Eigen::MatrixXd::Constant(100, 1, 2.0);
-  const Eigen::VectorXd floors = Eigen::VectorXd::Ones(1);
-  EXPECT_NEAR(log_likelihood_ratio(large, small, floors, 0.5), 25.0 * std::log(4.0), 1e-9);
-  EXPECT_NEAR(log_likelihood_ratio(small, large, floors, 0.5), -25.0 * std::log(4.0), 1e-9);
+  EXPECT_NEAR(nats(large, small, 0.5), 25.0 * std::log(4.0), 1e-9);
+  EXPECT_NEAR(nats(small, large, 0.5), -25.0 * std::log(4.0), 1e-9);
   // What both miss by far is no evidence; what one misses is.
   Eigen::MatrixXd other = small;
   other(0, 0) = large(0, 0) = 6.0;
-  EXPECT_NEAR(log_likelihood_ratio(large, other, floors, 1.0), 49.5 * std::log(4.0), 1e-9);
+  EXPECT_NEAR(nats(large, other, 1.0), 49.5 * std::log(4.0), 1e-9);
   other(0, 0) = 1.0;
-  EXPECT_NEAR(log_likelihood_ratio(large, other, floors, 1.0), 50.0 * std::log((99.0 * 4.0 + 36.0) / 100.0), 1e-9);
+  EXPECT_NEAR(nats(large, other, 1.0), 50.0 * std::log((99.0 * 4.0 + 36.0) / 100.0), 1e-9);
+}
+
+// The spread of the ratio over draws of normal noise, and of noise that few samples carry.
+TEST(CrossValidation, StandardErrorIsTheSpreadOverDraws) {
+  constexpr Eigen::Index n = 400;
+  constexpr int draws = 300;
+  for (const bool is_rare : {false, true}) {
+    Noise random(7);
+    double sum = 0.0;
+    double squares = 0.0;
+    double variances = 0.0;
+    for (int draw = 0; draw < draws; ++draw) {
+      Eigen::MatrixXd other(n, 1);
+      Eigen::MatrixXd found(n, 1);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        other(i, 0) = random.normal() * (is_rare && i % 25 == 0 ? 5.0 : 1.0);
+        found(i, 0) = other(i, 0) + 0.3 * std::sin(0.7 * static_cast<double>(i));
+      }
+      const Advantage own = advantage(found, other, Eigen::VectorXd::Constant(1, 100.0), 1.0);
+      sum += own.log_likelihood;
+      squares += own.log_likelihood * own.log_likelihood;
+      variances += own.standard_error * own.standard_error;
+    }
+    const double spread = std::sqrt(squares / draws - sum / draws * (sum / draws));
+    // A standard deviation of 300 draws has a standard error of 4 %. What the difference is in the mean counts as
+    // spread.
+    EXPECT_NEAR(std::sqrt(variances / draws), spread, 0.15 * spread) << is_rare;
+  }
+}
+
+TEST(CrossValidation, FewSamplesThatDecideAreNoProof) {
+  Noise random(3);
+  Eigen::MatrixXd found(500, 1);
+  for (Eigen::Index i = 0; i < found.rows(); ++i) found(i, 0) = random.normal();
+  Eigen::MatrixXd other = found;
+  found(100, 0) = 20.0;
+  found(300, 0) = 12.0;
+  other(100, 0) = 1.0;
+  other(300, 0) = 1.0;
+  const Advantage own = advantage(found, other, Eigen::VectorXd::Constant(1, 100.0), 1.0);
+  EXPECT_GT(own.log_likelihood, 100.0);
+  EXPECT_LT(own.log_likelihood, 2.0 * own.standard_error);
 }
 
 TEST(Contests, TheLikelihoodDecides) {
   const Log log;
   const Missing found = log.answer({"saturation"});
   const Missing other = log.answer({"square"}, 2.0);
-  EXPECT_EQ(better_of(found, other, -3.1).found[0].family, "saturation");
-  EXPECT_TRUE(better_of(found, other, -3.1).found[0].rivals.empty());
-  const Missing better = better_of(found, other, 3.1);
+  EXPECT_EQ(better_of(found, other, {-2.1, 1.0}).found[0].family, "saturation");
+  EXPECT_TRUE(better_of(found, other, {-2.1, 1.0}).found[0].rivals.empty());
+  const Missing better = better_of(found, other, {2.1, 1.0});
   EXPECT_EQ(better.found[0].family, "square");
   EXPECT_EQ(better.answer, Answer::named);
 
   // A tentative answer takes the place of a tentative one, but makes a certain one tentative.
   Missing tentative = other;
   tentative.found[0].confirmed = false;
-  const Missing doubted = better_of(found, tentative, 3.1);
+  const Missing doubted = better_of(found, tentative, {2.1, 1.0});
   EXPECT_EQ(doubted.found[0].family, "saturation");
   EXPECT_FALSE(doubted.found[0].confirmed);
   EXPECT_EQ(doubted.answer, Answer::unknown);
-  EXPECT_EQ(better_of(doubted, tentative, 3.1).found[0].family, "square");
+  EXPECT_EQ(better_of(doubted, tentative, {2.1, 1.0}).found[0].family, "square");
 }
 
 TEST(Contests, FewerNumbersHaveTheNameWhereRowsCannotTell) {
   const Log log;
   const Missing found = log.answer({"saturation"});  // two numbers
   const Missing other = log.answer({"square"}, 1.09);
-  const Missing simpler = better_of(found, other, -2.9);
+  const Missing simpler = better_of(found, other, {-1.9, 1.0});
   ASSERT_EQ(simpler.found.size(), 1u);
   EXPECT_EQ(simpler.found[0].family, "square");
   ASSERT_EQ(simpler.found[0].rivals.size(), 1u);
@@ -134,19 +179,28 @@ TEST(Contests, FewerNumbersHaveTheNameWhereRowsCannotTell) {
   EXPECT_TRUE(simpler.found[0].confirmed);
   EXPECT_EQ(simpler.answer, Answer::indistinguishable);
 
-  const Missing longer = better_of(found, log.answer({"square", "linear", "cube"}, 1.09), 2.9);
+  const Missing longer = better_of(found, log.answer({"square", "linear", "cube"}, 1.09), {1.9, 1.0});
   EXPECT_EQ(longer.found[0].family, "saturation");
   EXPECT_EQ(longer.found[0].rivals[0].what, "square x + linear x + cube x");
   EXPECT_TRUE(longer.found[0].confirmed);
 
   // Another function: rows elsewhere would tell, so neither is certain.
-  const Missing differing = better_of(found, log.answer({"square"}, 1.11), 0.0);
+  const Missing differing = better_of(found, log.answer({"square"}, 1.11), {0.0, 1.0});
   EXPECT_EQ(differing.found[0].family, "square");
   EXPECT_FALSE(differing.found[0].confirmed);
   EXPECT_EQ(differing.answer, Answer::indistinguishable);
 
+  // Nothing has fewer numbers than anything, and no rival.
+  Missing nothing = log.answer({});
+  nothing.answer = Answer::nothing_missing;
+  EXPECT_TRUE(better_of(found, nothing, {-1.9, 1.0}).found.empty());
+  EXPECT_EQ(better_of(found, nothing, {-1.9, 1.0}).answer, Answer::nothing_missing);
+  EXPECT_EQ(better_of(found, nothing, {-2.1, 1.0}).found.size(), 1u);
+  nothing.answer = Answer::undecided;
+  EXPECT_EQ(better_of(found, nothing, {-1.9, 1.0}).found.size(), 1u);
+
   // Terms of both have no rival.
-  const Missing both = better_of(log.answer({"square", "saturation"}), log.answer({"square", "linear"}), 0.0);
+  const Missing both = better_of(log.answer({"square", "saturation"}), log.answer({"square", "linear"}), {0.0, 1.0});
   EXPECT_EQ(both.found[0].family, "square");
   EXPECT_TRUE(both.found[0].rivals.empty());
   EXPECT_EQ(both.found[1].rivals[0].what, "saturation x");
@@ -178,6 +232,7 @@ std::vector<std::string> left_out_for(const Log& log, const Missing& found, cons
 TEST(Contests, EachAppliesToWhatItLeavesOut) {
   const Log log;
   using Searches = std::vector<std::string>;
+  const std::string all = "delay linear saturation gain square shapes regimes ";
   const std::set<std::size_t> regimes = terms_of_regimes(log.terms);
   ASSERT_FALSE(regimes.empty());
   EXPECT_EQ(left_out_for(log, log.answer({"square"}), regimes), Searches{});
@@ -185,7 +240,7 @@ TEST(Contests, EachAppliesToWhatItLeavesOut) {
 
   Missing of_state = log.answer({"delay"});
   of_state.answer = Answer::inner_state;
-  EXPECT_EQ(left_out_for(log, of_state), Searches{"delay "});
+  EXPECT_EQ(left_out_for(log, of_state), (Searches{all, "delay "}));
 
   // Something is left: regimes are no longer left out.
   Missing unknown = log.answer({"square"});

@@ -71,9 +71,10 @@ Eigen::MatrixXd CrossValidation::errors(const Missing& answer, const Eigen::Matr
   return errors;
 }
 
-double log_likelihood_ratio(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
-                            double independent_share) {
-  double ratio = 0.0;
+Advantage advantage(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
+                    double independent_share) {
+  Advantage sum;
+  double variance = 0.0;
   for (Eigen::Index o = 0; o < found.cols(); ++o) {
     const Eigen::ArrayXd own = found.col(o).cwiseAbs();
     const Eigen::ArrayXd others = other.col(o).cwiseAbs();
@@ -81,9 +82,21 @@ double log_likelihood_ratio(const Eigen::MatrixXd& found, const Eigen::MatrixXd&
     const double smallest = std::numeric_limits<double>::min();
     const double left = (counts * own.square()).sum() + smallest;
     const double left_by_other = (counts * others.square()).sum() + smallest;
-    ratio += 0.5 * independent_share * counts.sum() * std::log(left / left_by_other);
+    const double ratio = 0.5 * independent_share * counts.sum() * std::log(left / left_by_other);
+    sum.log_likelihood += ratio;
+    const Eigen::ArrayXd differences = counts * (own.square() - others.square());
+    if (!(differences.abs().maxCoeff() > 0.0)) continue;
+    const auto length = static_cast<Eigen::Index>(std::ceil(2.0 / independent_share));
+    double squares = 0.0;
+    for (Eigen::Index i = 0; i < differences.size(); i += length) {
+      const double block = differences.segment(i, std::min(length, differences.size() - i)).sum();
+      squares += block * block;
+    }
+    const double nats = ratio != 0.0 ? std::abs(ratio / (left - left_by_other)) : 0.0;
+    variance += nats * nats * squares;
   }
-  return ratio;
+  sum.standard_error = std::sqrt(variance);
+  return sum;
 }
 
 namespace {
@@ -92,7 +105,8 @@ using Terms = std::vector<ModelTerm>;
 using Left = std::set<std::size_t>;
 
 bool is_certain(const Missing& missing) {
-  return !missing.found.empty() && std::ranges::all_of(missing.found, &FoundTerm::confirmed);
+  if (missing.found.empty()) return missing.answer != Answer::unknown && missing.answer != Answer::undecided;
+  return std::ranges::all_of(missing.found, &FoundTerm::confirmed);
 }
 
 bool has_shapes(const Missing& missing) { return std::ranges::any_of(missing.found, &FoundTerm::generic); }
@@ -173,6 +187,12 @@ struct Others {
 // Nothing where the contest does not apply.
 using OthersOf = std::optional<Others> (*)(const Missing&, const Terms&, const Left& refuted);
 
+// A state filters the simulated output, errors of the inputs too, so that its standard error alone is no proof.
+std::optional<Others> all(const Missing& found, const Terms& terms, const Left&) {
+  if (found.answer != Answer::inner_state) return std::nullopt;
+  return Others{terms, with({}, terms, [](const ModelTerm&) { return true; })};
+}
+
 std::optional<Others> states(const Missing& found, const Terms& terms, const Left& refuted) {
   if (found.answer != Answer::inner_state) return std::nullopt;
   return Others{terms, with(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); })};
@@ -236,13 +256,29 @@ std::optional<Others> same_regimes(const Missing& found, const Terms& terms, con
   return others;
 }
 
+// Terms and the values of their constants were chosen on all rows: a term costs the logarithm of the number of those
+// that it was chosen from.
+double cost_of_choice(const Missing& answer, const Terms& terms) {
+  const auto of_regimes =
+      static_cast<double>(std::ranges::count_if(terms, [](const ModelTerm& term) { return !term.regime.empty(); }));
+  const double of_others = static_cast<double>(std::ssize(terms)) - of_regimes;
+  double cost = 0.0;
+  for (const FoundTerm& found : answer.found) {
+    const ModelTerm& term = terms[found.term];
+    cost += std::log(term.regime.empty() ? of_others : of_regimes);
+    for (const TermConstant& constant : term.constants) cost += std::log(std::max<double>(1.0, constant.tried.size()));
+  }
+  return cost;
+}
+
 struct Contest {
   const char* name;
   OthersOf others;
 };
 
 // Regimes last, because they are tried where everything else leaves something.
-constexpr std::array<Contest, 4> contests = {{{"no states", states},
+constexpr std::array<Contest, 5> contests = {{{"no terms", all},
+                                              {"no states", states},
                                               {"no searched constants", constants},
                                               {"regimes", plain_regimes},
                                               {"terms of these regimes", same_regimes}}};
@@ -255,17 +291,21 @@ std::set<std::size_t> terms_of_regimes(const Terms& terms) {
 
 bool leaves_something(const Missing& missing) {
   constexpr double as_noise = 1.2;
-  const auto is_noise = [&](const Gap& gap) { return gap.after <= as_noise * gap.known_noise; };
+  const auto is_noise = [&](const Gap& gap) {
+    return std::max(gap.after, gap.noise_floor) <= as_noise * gap.known_noise;
+  };
   if (missing.answer == Answer::inner_state || std::ranges::all_of(missing.gaps, is_noise)) return false;
   if (missing.time.in_time && missing.time.independent_share < alike_in_neighbours) return true;
   return missing.answer == Answer::unknown || missing.answer == Answer::undecided ||
          missing.answer == Answer::failed_held_out || !missing.structure.empty();
 }
 
-Missing better_of(Missing found, Missing other, double ratio) {
+Missing better_of(Missing found, Missing other, const Advantage& of_other) {
+  constexpr double sure = 2.0;  // standard errors
+  const double margin = sure * of_other.standard_error;
   const bool may_replace = is_certain(other) || !is_certain(found);
-  if (ratio < -likelihood_margin) return found;
-  if (ratio > likelihood_margin) {
+  if (of_other.log_likelihood < -margin) return found;
+  if (of_other.log_likelihood > margin) {
     return may_replace ? other : with_rival(std::move(found), other, Reason::likelier);
   }
   const std::optional<Reason> objection =
@@ -281,9 +321,8 @@ Missing contested(Missing found, const Terms& terms, const Left& refuted, const 
     const std::optional<Others> others = contest.others(found, terms, refuted);
     if (!others) continue;
     Missing other = search(others->terms, others->left_out);
-    const bool competes = other.answer != Answer::failed_held_out && !other.found.empty() &&
-                          beyond_constants(other, terms).empty() && !(has_shapes(other) && !has_shapes(found)) &&
-                          !has_same_terms(found, other);
+    const bool competes = other.answer != Answer::failed_held_out && beyond_constants(other, terms).empty() &&
+                          !(has_shapes(other) && !has_shapes(found)) && !has_same_terms(found, other);
     if (!competes) continue;
     Eigen::VectorXd floors(std::ssize(found.gaps));
     for (std::size_t o = 0; o < found.gaps.size(); ++o) {
@@ -292,9 +331,9 @@ Missing contested(Missing found, const Terms& terms, const Left& refuted, const 
     const double share = std::max(found.time.independent_share, other.time.independent_share);
     // What is uncertain by one of the two answers counts as uncertain.
     const Eigen::MatrixXd weights = found.weights.cwiseMin(other.weights);
-    const double ratio =
-        log_likelihood_ratio(validation.errors(found, weights), validation.errors(other, weights), floors, share);
-    found = better_of(std::move(found), std::move(other), ratio);
+    Advantage of_other = advantage(validation.errors(found, weights), validation.errors(other, weights), floors, share);
+    of_other.log_likelihood -= cost_of_choice(other, terms) - cost_of_choice(found, terms);
+    found = better_of(std::move(found), std::move(other), of_other);
   }
   return found;
 }

@@ -34,20 +34,24 @@ class CrossValidation {
   TermData data_;
 };
 
-/// Two answers of which neither is e^3, or 20, times as likely as the other cannot be told apart.
-inline constexpr double likelihood_margin = 3.0;
 /// Functions that differ by no more than this share of one of them are the same.
 inline constexpr double same_function = 0.1;
 
-/// The logarithm of the ratio of likelihoods of two answers, from their errors (samples x d) where fits have not used
-/// the samples:
+/// How much likelier another answer is than the one found.
+struct Advantage {
+  double log_likelihood = 0.0;  ///< logarithm of the ratio of likelihoods
+  double standard_error = 0.0;  ///< of log_likelihood
+};
+
+/// Of two answers, from their errors (samples x d) where fits have not used the samples:
 ///
 ///     sum_o phi N / 2 ln(S_o / S'_o),    S sums of squares,
 ///
 /// phi the independent share of the samples. Above 0 where `other` is better. Samples beyond 5 of `floors` (d) in both
-/// are outliers and do not count.
-double log_likelihood_ratio(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
-                            double independent_share);
+/// are outliers and do not count. Its variance is that of a sum over blocks of 2 / phi neighbours of e^2 - e'^2, in the
+/// same unit (Vuong 1989): large where few samples decide, as those at which a machine reverses.
+Advantage advantage(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
+                    double independent_share);
 
 /// Whether something is left that no term without a regime explains: more than twice the noise, as far as that is
 /// known, and the answer says so, or what is left is alike in neighbouring rows.
@@ -56,10 +60,10 @@ bool leaves_something(const Missing& missing);
 /// The indices of terms that act in a regime alone.
 std::set<std::size_t> terms_of_regimes(const std::vector<ModelTerm>& terms);
 
-/// Of two answers, the one that explains stretches best that no fit has used. `ratio`: log_likelihood_ratio(). Where it
-/// is within the margin, rows cannot tell them apart: the one of fewer numbers has the name, the other is its rival,
-/// and it is tentative unless both are the same function there. One that is certain is replaced by a certain one alone.
-Missing better_of(Missing found, Missing other, double ratio);
+/// Of two answers, the one that explains stretches best that no fit has used: by more than two standard errors. Between
+/// them rows cannot tell them apart: the one of fewer numbers has the name, the other is its rival, and it is tentative
+/// unless both are the same function there. One that is certain is replaced by a certain one alone.
+Missing better_of(Missing found, Missing other, const Advantage& of_other);
 
 /// Runs every contest that applies, in the order of a table: what was found against the answer of a search among other
 /// terms. `search`: of the terms given, but for those in the set. `refuted`: terms that are no candidates.

@@ -153,7 +153,9 @@ void judge_findings(Missing& missing, bool in_time) {
 void judge_noise(Missing& missing) {
   constexpr double far = 5.0;
   for (const Gap& gap : missing.gaps) {
-    if (!(gap.after > far * gap.known_noise)) continue;
+    // An effect that acts in few stretches may act in none of those set aside.
+    const double left = std::max(gap.after, gap.noise_floor);
+    if (!(left > far * gap.known_noise)) continue;
     std::vector<std::size_t> terms;
     for (std::size_t k = 0; k < missing.found.size(); ++k) {
       if (missing.found[k].output == gap.output && missing.found[k].inner_state.empty()) terms.push_back(k);
@@ -161,7 +163,7 @@ void judge_noise(Missing& missing) {
     if (missing.found.empty()) missing.visible.clear();  // what is left would hide them
     if (missing.found.empty() || !terms.empty()) object(missing, Reason::known_noise, terms);
     missing.notes.push_back(fmt::format(
-        "what is left of {} is {:.3g} times its known noise ({:.2g}): {}", gap.output, gap.after / gap.known_noise,
+        "what is left of {} is {:.3g} times its known noise ({:.2g}): {}", gap.output, left / gap.known_noise,
         gap.known_noise, missing.found.empty() ? "no term tried explains it" : "something more is missing"));
   }
 }

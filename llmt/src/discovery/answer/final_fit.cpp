@@ -98,6 +98,7 @@ void add_rivals(std::vector<std::pair<double, RivalTerms>> members, FoundTerm& f
 }  // namespace
 
 void name_groups(const TermModel& model, const TermData& data, const TermFit& fit, Missing& missing) {
+  constexpr double likelihood_margin = 3.0;  // e^3, 20 times as likely
   constexpr double hardly = 0.02;
   const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
   const double samples = data.independent_share * static_cast<double>(data.samples.size());
