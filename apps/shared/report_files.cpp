@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <filesystem>
+
 #include "llmt/files.hpp"
 #include "report/document/page.hpp"
 #include "shared/options.hpp"
@@ -46,6 +48,12 @@ std::string write_reports(const ReportFiles& files, const report::Document& docu
   if (!files.plot.empty()) {
     write_plot(files.plot, document.main.value());
     text += fmt::format("Picture written to {}\n", files.plot);
+    if (document.importance) {
+      const std::string extension = std::filesystem::path(files.plot).extension().string();
+      const std::string second = beside(files.plot, ".importance" + extension).string();
+      write_plot(second, *document.importance);
+      text += fmt::format("Picture written to {}\n", second);
+    }
   }
   return text;
 }

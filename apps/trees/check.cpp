@@ -86,10 +86,14 @@ void say(const CheckArguments& arguments, const report::TableCheckFacts& facts) 
 }
 
 void check_command(const CheckArguments& arguments) {
-  const auto read = [&] {
-    Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
-    if (csv.rows() == 0) throw report::NotEvaluated(fmt::format("{}: there is a header and no rows", csv.name()));
-    return csv;
+  const auto read = [&]() -> Csv {
+    try {
+      Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
+      if (csv.rows() == 0) throw report::NotEvaluated(fmt::format("{}: there is a header and no rows", csv.name()));
+      return csv;
+    } catch (const EmptyText& error) {
+      throw report::NotEvaluated(error.what());
+    }
   };
   report::TableCheckFacts facts{.model = arguments.model,
                                 .data = table_name(arguments.data),

@@ -43,7 +43,8 @@ struct FitArguments {
   bool teach = false;
   ArrowFitArguments arrow;
   DynamicArguments dynamic;
-  std::string readable;  ///< the loss in per cent; empty: none is asked for
+  std::string readable;             ///< the loss in per cent; empty: none is asked for
+  Eigen::Index readable_rules = 0;  ///< 0: the default step
   ReportFiles reports;
 };
 
@@ -74,7 +75,8 @@ Fitting fit_with_bar(const FitArguments& arguments, const LearningTable& table) 
 }
 
 // The readable tree beside the model, written if the model is.
-std::optional<ReadableResult> make_readable(const FitArguments& arguments, const Fitting& fitting, double loss) {
+std::optional<ReadableResult> make_readable(const FitArguments& arguments, const Fitting& fitting,
+                                            const ReadableOptions& asked) {
   const FitSummary& fitted = fitting.result.summary;
   if (fitted.partitions.front().cv_folds == 0) {
     throw std::runtime_error(
@@ -82,7 +84,7 @@ std::optional<ReadableResult> make_readable(const FitArguments& arguments, const
                     table_name(arguments.learning.data), fitted.samples));
   }
   ProgressBar bar("readable tree");
-  ReadableResult readable = fit_readable(fitting.prepared, fitted, loss, bar.callback());
+  ReadableResult readable = fit_readable(fitting.prepared, fitted, asked, bar.callback());
   bar.clear();
   if (!arguments.output.empty()) {
     save(readable.model, keeps_intervals(arguments) ? readable.intervals : Intervals(),
@@ -139,10 +141,9 @@ std::optional<std::string> words_of_neighbours(const LearningTable& table, const
 }
 
 void fit_command(FitArguments arguments) {
-  double loss = 0.0;
-  if (!arguments.readable.empty()) {
-    loss = read_number("--readable", arguments.readable, per_cent) / 100.0;
-  }
+  ReadableOptions asked{.rules = arguments.readable_rules};
+  if (asked.rules > 0 && arguments.readable.empty()) arguments.readable = "15";
+  if (!arguments.readable.empty()) asked.loss = read_number("--readable", arguments.readable, per_cent) / 100.0;
   LearningTable table = read_learning_table(arguments.learning);
   if (const std::string why = why_not_taught(table.options); arguments.teach && !why.empty()) {
     throw std::invalid_argument("llmt::fit_taught: --teach does not go with " + why);
@@ -160,7 +161,7 @@ void fit_command(FitArguments arguments) {
     save(result.model, keeps_intervals(arguments) ? result.intervals : Intervals(), arguments.output);
   }
   std::optional<ReadableResult> readable;
-  if (!arguments.readable.empty()) readable = make_readable(arguments, fitting, loss);
+  if (!arguments.readable.empty()) readable = make_readable(arguments, fitting, asked);
   const std::optional<std::string> neighbours = words_of_neighbours(table, result);
   const auto run_of = [&](const std::string& data, const std::string& output) {
     return report::FitRun{data, table.options, *table.data, table.lines, output};
@@ -169,7 +170,7 @@ void fit_command(FitArguments arguments) {
     report::Document words = report::fit_words(run_of(table_name(arguments.learning.data), output), result);
     if (neighbours) words.notes.push_back(*neighbours);
     if (fitting.taught) words.sections.push_back(report::teaching_words(*fitting.taught));
-    if (readable) words.sections.push_back(report::readable_words(result, *readable, loss));
+    if (readable) words.sections.push_back(report::readable_words(result, *readable, asked));
     return words;
   };
   // A page goes to others, whom the place of the file does not concern.
@@ -178,7 +179,7 @@ void fit_command(FitArguments arguments) {
     const report::FitRun run = run_of(arguments.learning.data, arguments.output);
     Json summary = report::fit_json(run, result);
     if (fitting.taught) summary["teaching"] = report::teaching_json(*fitting.taught);
-    if (readable) summary["readable"] = report::readable_json(*readable);
+    if (readable) summary["readable"] = report::readable_json(result, *readable, asked);
     print_json(summary);
     return;
   }
@@ -211,10 +212,14 @@ void add_fit(CLI::App& app) {
                  "Also the smallest crisp tree with short, rounded equations whose held-out error is at most this many "
                  "per cent above that of the best crisp tree [15]; written beside the model as NAME.readable.json")
       ->option_text("[=LOSS]");
+  add_count(*command, "--readable-rules", arguments->readable_rules, Eigen::Index{1},
+            "As --readable, but of its trees the one with the most rules up to this number",
+            Eigen::Index{1000});
   command->add_flag("--teach", arguments->teach,
                     "Fit the tree to the answers of a sum of trees (--boost), on the rows and on rows made of them; "
                     "taken if its held-out error is smaller. Takes several times as long");
-  add_report_options(*command, arguments->reports, "predicted against observed");
+  add_report_options(*command, arguments->reports,
+                     "predicted against observed (and FILE.importance.svg: what matters)");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory");
   command->add_flag("--boost", arguments->boost,

@@ -46,6 +46,7 @@ constexpr OtherOption other_options[] = {{"help", "stream boost files"},
                                          {"grid", ""},
                                          {"accept-unstable", ""},
                                          {"readable", ""},
+                                         {"readable-rules", ""},
                                          {"teach", ""},
                                          {"plot", ""},
                                          {"report", ""}};

@@ -41,9 +41,9 @@ constexpr double readable_share = 0.4;
 // A fit with all that reports need of it.
 class Fit {
  public:
-  Fit(TrainingData data, const FitOptions& options, std::optional<double> readable_loss, bool teach,
-      const nb::object& report)
-      : options_(options), loss_(readable_loss.value_or(0.15)) {
+  Fit(TrainingData data, const FitOptions& options, std::optional<double> readable_loss, Eigen::Index readable_rules,
+      bool teach, const nb::object& report)
+      : options_(options), asked_{readable_loss.value_or(ReadableOptions().loss), readable_rules} {
     if (const std::string why = teach ? why_not_taught(options) : ""; !why.empty()) {
       throw std::invalid_argument("teaching does not go with " + why);
     }
@@ -68,7 +68,7 @@ class Fit {
           }
           if (!readable_loss) return;
           Work reading(work, work.left());
-          readable_ = fit_readable(*prepared_, result_->summary, loss_, reading.progress());
+          readable_ = fit_readable(*prepared_, result_->summary, asked_, reading.progress());
         },
         report);
   }
@@ -81,7 +81,7 @@ class Fit {
   std::string summary(const std::string& data) const {
     report::Json summary = report::fit_json(run(data), *result_);
     if (taught_) summary["teaching"] = report::teaching_json(*taught_);
-    if (readable_) summary["readable"] = report::readable_json(*readable_);
+    if (readable_) summary["readable"] = report::readable_json(*result_, *readable_, asked_);
     return summary.dump();
   }
 
@@ -117,7 +117,7 @@ class Fit {
     std::optional<ReadableResult> shown = readable_;
     if (!shown && has_folds && why_not_readable(options_).empty()) {
       interruptible(
-          [&](const Progress& progress) { shown = fit_readable(*prepared_, result_->summary, loss_, progress); },
+          [&](const Progress& progress) { shown = fit_readable(*prepared_, result_->summary, asked_, progress); },
           nb::none());
     }
     const TrainingData& rows = prepared_->data();
@@ -132,12 +132,12 @@ class Fit {
   report::Document words(const std::string& data) const {
     report::Document words = report::fit_words(run(data), *result_);
     if (taught_) words.sections.push_back(report::teaching_words(*taught_));
-    if (readable_) words.sections.push_back(report::readable_words(*result_, *readable_, loss_));
+    if (readable_) words.sections.push_back(report::readable_words(*result_, *readable_, asked_));
     return words;
   }
 
   FitOptions options_;
-  double loss_;
+  ReadableOptions asked_;
   std::optional<PreparedFit> prepared_;
   std::optional<FitResult> result_;
   std::optional<TaughtResult> taught_;
@@ -149,15 +149,15 @@ std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const 
                                std::vector<std::string> input_names, std::vector<std::string> output_names,
                                std::vector<std::vector<std::string>> levels, const std::optional<Vector>& weights,
                                const std::optional<Vector>& groups, std::vector<Eigen::Index> held_out,
-                               bool may_have_codes, std::optional<double> readable_loss, bool teach,
-                               const nb::object& report) {
+                               bool may_have_codes, std::optional<double> readable_loss, Eigen::Index readable_rules,
+                               bool teach, const nb::object& report) {
   TrainingData data = training_data_of(inputs, outputs, weights, groups);
   data.held_out = std::move(held_out);
   data.levels = std::move(levels);
   data.may_have_codes = may_have_codes;
   data.input_names = std::move(input_names);
   data.output_names = std::move(output_names);
-  return std::make_unique<Fit>(std::move(data), options_of(options), readable_loss, teach, report);
+  return std::make_unique<Fit>(std::move(data), options_of(options), readable_loss, readable_rules, teach, report);
 }
 
 // Inputs that look as if nobody meant them: (kind, position, detail, whether it is left out).
@@ -259,7 +259,7 @@ void add_fitting(nb::module_& module) {
   module.def("fit", &fit_table, nb::arg("inputs"), nb::arg("outputs"), nb::arg("options"), nb::kw_only(),
              nb::arg("input_names"), nb::arg("output_names"), nb::arg("levels"), nb::arg("weights") = nb::none(),
              nb::arg("groups") = nb::none(), nb::arg("held_out") = std::vector<Eigen::Index>(),
-             nb::arg("may_have_codes") = true, nb::arg("readable_loss") = nb::none(), nb::arg("teach") = false,
+             nb::arg("may_have_codes") = true, nb::arg("readable_loss") = nb::none(), nb::arg("readable_rules") = 0, nb::arg("teach") = false,
              nb::arg("report") = nb::none());
   module.def("accidental_inputs", &accidental, nb::arg("inputs"), nb::arg("levels"));
   module.def("dominant_rows", &dominant, nb::arg("output"));

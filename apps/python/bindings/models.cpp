@@ -6,7 +6,9 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -16,11 +18,13 @@
 #include "llmt/explain.hpp"
 #include "llmt/intervals.hpp"
 #include "llmt/model.hpp"
+#include "llmt/permutation_importance.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/checked.hpp"
 #include "python/bindings/model_arrays.hpp"
 #include "python/bindings/module.hpp"
 #include "report/model/leaves.hpp"
+#include "report/model/plain_source.hpp"
 #include "report/model/rules.hpp"
 
 namespace llmt::python {
@@ -111,6 +115,23 @@ auto importance_of(const ModelWithIntervals& self, const Array& inputs, int thre
   return array_of<double>(std::move(shares));
 }
 
+// By how much the error on these rows grows without each input, and its standard error: outputs x inputs each.
+auto permutation_importance_of(const ModelWithIntervals& self, const Array& inputs, const Array& outputs,
+                               const std::optional<Vector>& weights, const PermutationOptions& options) {
+  const Eigen::MatrixXd x = rows_of(inputs);
+  const Eigen::MatrixXd y = rows_of(outputs);
+  std::vector<std::vector<Eigen::Index>> all(1, std::vector<Eigen::Index>(static_cast<std::size_t>(x.rows())));
+  std::iota(all[0].begin(), all[0].end(), Eigen::Index{0});
+  PermutationImportance found;
+  interruptible(
+      [&](const Progress& progress) {
+        found = permutation_importance({self.model}, x, y, all, weights ? vector_of(*weights) : Eigen::VectorXd(),
+                                       options, progress);
+      },
+      nb::none());
+  return std::make_tuple(array_of<double>(std::move(found.increase)), array_of<double>(std::move(found.standard_error)));
+}
+
 std::tuple<std::string, std::string> c_source(const ModelWithIntervals& self, const std::string& name) {
   CSource written = to_c(self.model, name, name + ".h");
   return {std::move(written.source), std::move(written.header)};
@@ -140,6 +161,17 @@ void add_models(nb::module_& module) {
       .def("attribute", &attribute_rows, nb::arg("inputs"))
       .def("importance", &importance_of, nb::arg("inputs"), nb::arg("threads") = 0)
       .def(
+          "permutation_importance",
+          [](const Self& self, const Array& inputs, const Array& outputs, const std::optional<Vector>& weights,
+             int repeats, std::uint64_t seed, int threads) {
+            const auto rows = static_cast<Eigen::Index>(inputs.shape(0));
+            return permutation_importance_of(
+                self, inputs, outputs, weights,
+                {.repeats = repeats, .most_rows = std::max(rows, Eigen::Index{10}), .seed = seed, .max_threads = threads});
+          },
+          nb::arg("inputs"), nb::arg("outputs"), nb::arg("weights").none(), nb::arg("repeats"), nb::arg("seed"),
+          nb::arg("threads") = 0)
+      .def(
           "check",
           [](const Self& self, const Array& inputs, const Array& outputs,
              const std::vector<std::map<std::string, Eigen::Index>>& words, double level, std::vector<double> limits,
@@ -150,6 +182,14 @@ void add_models(nb::module_& module) {
           nb::arg("inputs"), nb::arg("outputs"), nb::arg("words"), nb::arg("level"), nb::arg("limits"),
           nb::arg("weights").none(), nb::arg("threads") = 0)
       .def("to_c", &c_source, nb::arg("name"))
+      .def("plain_source",
+           [](const Self& self, const std::string& language, const std::string& name) {
+             const auto as = language == "c"        ? report::PlainLanguage::c
+                             : language == "python" ? report::PlainLanguage::python
+                                                    : report::PlainLanguage::sql;
+             return report::plain_source(self.model, as, name, "model");
+           },
+           nb::arg("language"), nb::arg("name"))
       .def("leaves_json", [](const Self& self) { return report::leaves_json(self.model).dump(); })
       .def("leaves_text", [](const Self& self, const std::string& name,
                              std::size_t width) { return report::leaves_text(self.model, name, width); })

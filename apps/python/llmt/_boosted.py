@@ -180,11 +180,11 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
         means = handle.partial_dependence(rows, position, values, self._threads())
         return np.array(list(at)), self._shaped(means)
 
-    def to_onnx(self) -> NoReturn:
+    def to_onnx(self, *args: Any, **keywords: Any) -> NoReturn:
         """Raises ValueError: a sum is too large for a graph of ONNX's operators. `to_c` has all of it."""
         self._refuse("to_onnx()")
 
-    def to_sql(self) -> NoReturn:
+    def to_sql(self, *args: Any, **keywords: Any) -> NoReturn:
         """Raises ValueError: a sum is too large for a SELECT. `to_c` has all of it."""
         self._refuse("to_sql()")
 

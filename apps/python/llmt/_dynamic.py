@@ -165,11 +165,11 @@ class DynamicLocalLinearTreeRegressor:
         source, header = self._model().c_source(name)
         return source, header
 
-    def to_onnx(self) -> NoReturn:
+    def to_onnx(self, *args: Any, **keywords: Any) -> NoReturn:
         """Raises ValueError: a graph of ONNX has no state. `to_c` has one."""
         raise ValueError("to_onnx: a system that moves has a state, which a graph of ONNX has not; to_c writes it as C")
 
-    def to_sql(self) -> NoReturn:
+    def to_sql(self, *args: Any, **keywords: Any) -> NoReturn:
         """Raises ValueError: a SELECT has no state. `to_c` has one."""
         raise ValueError("to_sql: a system that moves has a state, which a SELECT has not; to_c writes it as C")
 

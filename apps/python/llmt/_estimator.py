@@ -1,6 +1,7 @@
 """The estimator of one tree."""
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
 
@@ -13,6 +14,17 @@ from ._progress import Bar
 from ._regressor import FitRows, TableRegressor, check_rows, count, names_of, spread, target_names, weights_of
 from ._tree_views import TreeViews
 from .tables import Table, read_table, read_targets
+
+# Beyond, a share of error was meant to be per cent.
+_most_loss = 2.0
+
+
+def _rules(value: Any) -> int:
+    """A number of rules; None is 0, the default step."""
+    if value is not None and (isinstance(value, bool) or count("readable_rules", value) == 0):
+        raise ValueError(f"readable_rules is {value!r}; it must be a whole number of 1 or more, or None")
+    return count("readable_rules", value)
+
 
 class LocalLinearTreeRegressor(TreeViews, TableRegressor):
     """A regression tree with a linear equation in every leaf, which may blend smoothly into its neighbours.
@@ -60,6 +72,8 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
     readable : bool or float, default=False
         Predict by the smallest crisp tree with short, rounded equations whose held-out error is at most 15 % (or this
         share) above that of the best crisp tree.
+    readable_rules : int or None, default=None
+        As `readable=True`, but of the readable trees the one with the most rules up to this number. `steps_` has them.
     teach : bool, default=False
         Fit the tree, and the readable one, to the answers of a sum of trees (`BoostedLocalLinearTreeRegressor`), on the
         rows and on rows made of them, if that lowers the held-out error. `summary_["teaching"]` has the errors of the
@@ -111,6 +125,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         monotonic_cst: Mapping[str, int] | Sequence[int] | None = None,
         shared_tree: bool = False,
         readable: bool | float = False,
+        readable_rules: int | None = None,
         teach: bool = False,
         random_state: Any = None,
         n_jobs: int | None = None,
@@ -130,6 +145,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         self.monotonic_cst = monotonic_cst
         self.shared_tree = shared_tree
         self.readable = readable
+        self.readable_rules = readable_rules
         self.teach = teach
         self.random_state = random_state
         self.n_jobs = n_jobs
@@ -152,6 +168,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
                 held_out=rows.held_out,
                 may_have_codes=bool(self.integer_codes),
                 readable_loss=self._readable_loss(),
+                readable_rules=_rules(self.readable_rules),
                 teach=bool(self.teach),
                 report=bar,
             )
@@ -256,9 +273,20 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         self._is_readable = False
 
     def _readable_loss(self) -> float | None:
-        if self.readable is False:
+        if self.readable is False and self.readable_rules is None:
             return None
-        return 0.15 if self.readable is True else float(self.readable)
+        if isinstance(self.readable, (bool, np.bool_)):
+            return 0.15
+        try:
+            loss = float(self.readable)
+        except (TypeError, ValueError):
+            loss = math.nan
+        if not 0.0 <= loss <= _most_loss:
+            hint = f": {loss / 100.0:g} for {loss:g} %" if loss > _most_loss else ""
+            raise ValueError(
+                f"readable is {self.readable!r}; it must be True, False or a share of error from 0 to {_most_loss:g}{hint}"
+            )
+        return loss
 
     def _options(self, table: Table | None = None) -> dict[str, Any]:
         """The options of a fit by the library's names. Without a table, signs are those of no particular columns.

@@ -21,6 +21,7 @@ class Facts:
     errors: list[tuple[str, float, float]]  # name, held-out RMSE, its spread over the folds; the model comes first
     how: str  # how the errors came to be
     coverage: str  # of the prediction intervals; empty: not known
+    reading: dict[str, Any] | None = None  # the readable tree of the summary, if it is the model
 
 
 def facts_of(
@@ -44,7 +45,9 @@ def facts_of(
     outputs = tree.partition["outputs"]
     if summary and position < len(summary.get("partitions", [])):  # streams and files have no comparison
         of = summary["partitions"][position]
-        _errors(facts, of, [r for r in summary.get("readable", []) if r["targets"] == of["targets"]], readable)
+        trees = [r for r in summary.get("readable", []) if r["targets"] == of["targets"]]
+        _errors(facts, of, trees, readable)
+        facts.reading = trees[0] if readable and trees else None
         if mean is not None and len(outputs) == 1 and facts.errors:
             rmse, spread = (float(np.ravel(values)[outputs[0]]) for values in mean)
             facts.errors.append(("mean of the rows", rmse, spread))

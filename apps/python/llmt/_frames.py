@@ -202,6 +202,50 @@ def candidates_frame(summary: dict[str, Any], mean: Any = None, readable: bool =
     return table_of(rows, ["target", "model", "validity", "width", "leaves", "rmse", "spread", "chosen"])
 
 
+def steps_frame(summary: dict[str, Any]) -> Any:
+    """A row for each step of the readable trees."""
+    if "readable" not in summary:
+        raise ValueError("steps_ are those of the readable tree: fit with readable=True")
+    rows = []
+    for tree in summary["readable"]:
+        for k, step in enumerate(tree["path"]):
+            rows.append(
+                {
+                    "target": ", ".join(tree["targets"]),
+                    "rules": step["leaves"],
+                    "terms": step["most_terms"],
+                    "size": step["size"],
+                    "rmse": step["cv_rmse"],
+                    "spread": step["spread"],
+                    "above_model": math.nan if step["above_model"] is None else step["above_model"],
+                    "taken": k == tree["taken"],
+                }
+            )
+    return table_of(rows, ["target", "rules", "terms", "size", "rmse", "spread", "above_model", "taken"])
+
+
+def importance_frame(summary: dict[str, Any]) -> Any:
+    """A row for each target and input of the summary's importances, the largest increase first."""
+    rows: list[dict[str, Any]] = []
+    for partition in summary["partitions"]:
+        if "importance" not in partition:
+            raise ValueError("importance_ is of held-out rows, and nothing was held out in the fit (cv=0)")
+        for target, of_target in zip(partition["targets"], partition["importance"], strict=True):
+            ordered = sorted(of_target, key=lambda row: -row["increase"])
+            rows += [{"target": target, **row} for row in ordered]
+    return table_of(rows, ["target", "input", "increase", "standard_error"])
+
+
+def importance_rows(targets: list[str], inputs: list[str], increase: Any, errors: Any) -> Any:
+    """The same of arrays, targets x inputs."""
+    rows = []
+    for o, target in enumerate(targets):
+        for j in np.argsort(-increase[o], kind="stable"):
+            row = {"increase": float(increase[o][j]), "standard_error": float(errors[o][j])}
+            rows.append({"target": target, "input": inputs[j], **row})
+    return table_of(rows, ["target", "input", "increase", "standard_error"])
+
+
 def curves(summary: dict[str, Any]) -> dict[str, dict[str, np.ndarray]]:
     """Held-out errors against size, for each target (or targets that share a tree, joined by ", ").
 

@@ -294,6 +294,28 @@ def plot_waterfall(
     return ax
 
 
+def plot_increase(
+    names: Sequence[str], increase: Any, errors: Any, ax: Any = None, most: int = 20, name: str = "the target"
+) -> Any:
+    """Bars of how much the error grows without each input, with whiskers of two standard errors, the largest on top.
+    Grey: within them."""
+    increase, errors = (np.asarray(values, dtype=float) for values in (increase, errors))
+    order = np.argsort(-increase, kind="stable")
+    rest = order[most:]
+    order = order[:most]
+    ax = _axes(ax, (6.0, 0.9 + 0.27 * len(order)))
+    at = np.arange(len(order))
+    beyond = increase[order] > 2.0 * errors[order]
+    colours = [_BLUE if is_beyond else "#b8c0c8" for is_beyond in beyond]
+    ax.barh(at, increase[order], xerr=2.0 * errors[order], color=colours, ecolor="#5b6875", height=0.7)
+    ax.set_yticks(at, [shown(names[k], 28) for k in order], parse_math=False)
+    ax.invert_yaxis()
+    ax.set_xlabel(f"RMSE of {shown(name, 28)} grows by", parse_math=False)
+    ax.set_title("What matters" + (f", without {len(rest)} smaller ones" if len(rest) else ""), fontsize="medium")
+    _clear(ax)
+    return ax
+
+
 def plot_all(
     model: dict[str, Any],
     summary: dict[str, Any],
@@ -317,7 +339,10 @@ def plot_all(
     below = [figure.add_subplot(grid[1, k]) for k in range(3)]
     plot_predicted(observed, predicted, below[0], tree.targets[0], rows)
     plot_error_over_leaves(summary, below[1], target, readable)
-    plot_importance(names, importance, below[2], 12)
+    if isinstance(importance, tuple):
+        plot_increase(*importance, ax=below[2], most=12, name=tree.targets[0])
+    else:
+        plot_importance(names, importance, below[2], 12)
     figure.draw_without_rendering()  # the tree's letters follow the size of its axes
     plot_tree(model, summary, above, target, 16, readable)
     return [above, *below]

@@ -308,7 +308,21 @@ class TableRegressor(RegressorMixin, BaseEstimator):
     def _threads(self) -> int:
         if self.n_jobs is None or self.n_jobs == -1:
             return 0
+        if self.n_jobs == 0:
+            raise ValueError("n_jobs is 0; it must be a number of threads of 1 or more, or None or -1 for all")
         return count("n_jobs", self.n_jobs)
+
+    def set_params(self, **params: Any) -> "Self":
+        """Sets parameters; a name that is none is refused in a line that does not print the fitted model."""
+        known = self.get_params(deep=True)
+        for name in params:
+            if name not in known:
+                raise ValueError(
+                    f"Invalid parameter {name!r} for estimator {type(self).__name__}. "
+                    f"Valid parameters are: {sorted(known)!r}."
+                )
+        super().set_params(**params)
+        return self
 
     def _seed(self) -> int:
         if self.random_state is None:

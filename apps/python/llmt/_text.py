@@ -38,7 +38,10 @@ def tree_text(
             for name, rmse, spread in facts.errors:
                 beside = f" +- {number(spread, 2):<8}" if has_spread else ""
                 lines.append(f"  {number(rmse):>9}{beside} {name}")
-            lines += textwrap.wrap(_cost_of_reading(facts.errors) if readable else "", width)
+        if facts.reading:
+            lines += _steps(facts.reading["path"], facts.reading["taken"])
+            for sentence in facts.reading["sentences"]:
+                lines += textwrap.wrap(sentence, width)
         items = items_of(tree, most_leaves)
         lines += ["", *_tree_lines(tree, items, width)]
         if notes := " ".join(notes_of(tree, items)):
@@ -48,12 +51,20 @@ def tree_text(
     return "\n\n".join(parts)
 
 
-def _cost_of_reading(errors: list[tuple[str, float, float]]) -> str:
-    """The readable tree, which is the first, beside the most accurate model, the second."""
-    cost = errors[0][1] / errors[1][1] - 1.0 if len(errors) > 1 and errors[1][1] > 0.0 else 0.0
-    if cost <= 0.05:
-        return ""
-    return f"Reading costs {100.0 * cost:.0f} % more error; a smaller share, such as readable=0.05, costs less."
+# Rules that a person reads.
+_MOST_READ_RULES = 12
+
+
+def _steps(path: list[dict[str, Any]], taken: int) -> list[str]:
+    """The readable trees that can be had, a line each, as `llmt fit --readable` prints them."""
+    lines = ["  rules  terms per rule  size  RMSE held-out  above the model"]
+    for k, step in enumerate(path):
+        if step["leaves"] > _MOST_READ_RULES and k not in (taken, len(path) - 1):
+            continue
+        above = "" if step["above_model"] is None else f"{100.0 * step['above_model']:.0f} %"
+        line = f"  {step['leaves']:>5}  {step['most_terms']:>14}  {step['size']:>4}  {number(step['cv_rmse']):>13}  {above:>15}"
+        lines.append(line.rstrip() + ("  taken" if k == taken else ""))
+    return lines
 
 
 def _tree_lines(tree: Tree, items: list[Item], width: int) -> list[str]:

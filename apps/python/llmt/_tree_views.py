@@ -49,11 +49,77 @@ class TreeViews(Views):
         return candidates_frame(self._summary("candidates_"), self._mean, self._is_readable)
 
     @property
+    def steps_(self) -> Any:
+        """The readable trees that can be had, a row for each number of rules that pays: `target`, `rules`, `terms` of the
+        longest rule, `size` of the expression, held-out `rmse` and its `spread`, `above_model`, the share of error above
+        the most accurate model, and `taken`. `readable_rules=N` takes another one."""
+        from ._frames import steps_frame
+
+        return steps_frame(self._summary("steps_"))
+
+    @property
     def curves_(self) -> Any:
         """Held-out errors over the number of leaves and of inputs, for each target."""
         from ._frames import curves
 
         return curves(self._summary("curves_"))
+
+    @property
+    def importance_(self) -> Any:
+        """By how much the error on held-out rows grows without each input, the largest first for each target.
+
+        Columns: `target`, `input`, `increase` of the RMSE when the input's values are exchanged between rows, and its
+        `standard_error`; within two of them an increase is chance. The folds' models of the most accurate fit predict
+        (docs/python/explain.md).
+        """
+        from ._frames import importance_frame
+
+        return importance_frame(self._summary("importance_"))
+
+    def permutation_importance(
+        self, X: Any, y: Any, *, n_repeats: int = 5, random_state: int = 1, sample_weight: Any = None
+    ) -> Any:
+        """As `importance_`, of this model on rows that are given: such as the fit has not seen, for an honest answer."""
+        from ._frames import importance_rows
+        from ._regressor import check_rows, weights_of
+        from .tables import read_targets
+
+        table = self._table(X)
+        outputs, _ = read_targets(y)
+        check_rows(len(table.values), len(outputs))
+        increase, errors = self._model().handle.permutation_importance(
+            table.values,
+            outputs.reshape(len(outputs), -1),
+            weights_of(sample_weight, len(outputs)),
+            n_repeats,
+            random_state,
+            self._threads(),
+        )
+        return importance_rows(self._outputs, self._inputs, increase, errors)
+
+    def plot_importance(self, ax: Any = None, target: "str | int" = 0) -> Any:
+        """The inputs by `importance_`, with whiskers of two standard errors; of a model without held-out rows by
+        `feature_importances_`."""
+        from ._plots import plot_importance, plot_increase
+
+        of_target = self._increase(target)
+        if of_target is None:
+            return plot_importance(self._inputs, self._importances(), ax=ax)
+        return plot_increase(*of_target, ax=ax, name=self._outputs[self._position(target)])
+
+    def _increase(self, target: "str | int") -> "tuple[list[str], list[float], list[float]] | None":
+        """Inputs, increases and standard errors of a target; None if nothing was held out."""
+        self._model()
+        name = self._outputs[self._position(target)]
+        for partition in self.summary_.get("partitions", []):
+            if name in partition["targets"] and "importance" in partition:
+                rows = partition["importance"][partition["targets"].index(name)]
+                return (
+                    [row["input"] for row in rows],
+                    [row["increase"] for row in rows],
+                    [row["standard_error"] for row in rows],
+                )
+        return None
 
     def explain(self, X: Any) -> "Explanation":
         """Contributions of the inputs to each prediction; they add up to it.
@@ -93,7 +159,7 @@ class TreeViews(Views):
             self._model().to_dict(),
             self.summary_,
             self._inputs,
-            self._importances(),
+            self._increase(target) or self._importances(),
             observed,
             predicted,
             target,
@@ -120,6 +186,21 @@ class TreeViews(Views):
         from .export import to_python
 
         return to_python(self._model().to_dict(), name)
+
+    def to_plain(self, language: str = "python", name: str = "model") -> str:
+        """A readable tree as plain `if` and equations that a person reads, in "c", "python" or "sql": a function
+        NAME_TARGET(inputs) for each target, in SQL a query of the table NAME. Raises ValueError for other models, which
+        are more than their rules."""
+        languages = ("c", "python", "sql")
+        if language not in languages:
+            raise ValueError(f"language is {language!r}; it must be one of {', '.join(languages)}")
+        if not (language == "sql" or (name.isidentifier() and name.isascii())):
+            raise ValueError(f"name is {name!r}; it must be an identifier")
+        try:
+            text: str = self._model().handle.plain_source(language, name)
+        except RuntimeError as error:
+            raise ValueError(str(error)) from None
+        return text
 
     def to_sql(self, table: str = "data", dialect: str = "postgresql", keep: "Sequence[str]" = ()) -> str:
         """A SELECT that predicts the rows of a table; `keep`: columns that it also gives. Dialects are those of

@@ -153,6 +153,7 @@ struct Document {
   std::string lead = {};                ///< one or two more
   std::vector<std::string> notes = {};  ///< sentences to be read before anything below is believed
   std::optional<Chart> main = {};
+  std::optional<Chart> importance = {};  ///< a picture of its own beside that of `main`; in pages it is in beside_main
   std::vector<Json> beside_main = {};
   std::vector<Section> sections = {};
 };

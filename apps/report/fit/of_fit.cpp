@@ -56,6 +56,7 @@ void add_output(const Fitted& fitted, std::size_t p, std::size_t o, bool alone, 
     document.answer = sentence(rows, partition, name);
     document.lead = lead(fitted, rows, partition, p);
     document.main = main;
+    if (found) document.importance = what_matters;
     document.beside_main = {block(what_matters)};
   } else {
     document.sections.push_back({fmt::format("{}: how well", name),

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <limits>
 
 #include "llmt/size.hpp"
 #include "report/fit/fit_summary.hpp"
@@ -33,26 +33,44 @@ Eigen::Index most_terms(const Partition& partition) {
   return most;
 }
 
-// How the readable tree was chosen. `of`: " of TARGET" where there are several.
-std::string note_on(const ReadablePartition& simple, const std::string& of, double loss) {
-  const std::string best = number(simple.best_crisp);
-  if (simple.is_within_loss) {
-    return fmt::format(
-        "The readable tree{} is the smallest one whose held-out RMSE is at most {:g} % above that of the best crisp "
-        "tree of any form, unrounded and short ones included ({}).",
-        of, 100.0 * loss, best);
+// Rules that a person reads.
+constexpr Eigen::Index most_read_rules = 12;
+
+double smallest_crisp(const PartitionSummary& full) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const CandidateError& error : full.best_of_kind) {
+    if (error.candidate.validity.kind == ValidityKind::crisp) smallest = std::min(smallest, error.rmse);
   }
-  const std::string none = fmt::format("No short tree{} came within {:g} % of {}", of, 100.0 * loss, best);
-  const double above = 100.0 * (simple.rmse / simple.best_crisp - 1.0);
-  return std::isfinite(above) ? fmt::format("{}; this one is {} % above.", none, number(above, above < 100.0 ? 2 : 3))
-                              : fmt::format("{}; this one has {}.", none, number(simple.rmse));
+  return smallest;
 }
+
+// How the readable tree was chosen. `of`: " of TARGET" where there are several.
+std::string note_on(const ReadablePartition& simple, const PartitionSummary& full, const std::string& of,
+                    const ReadableOptions& asked) {
+  if (asked.rules > 0) {
+    const std::string none =
+        simple.leaves == asked.rules ? "" : fmt::format("; no step has {}, or those that have pay with nothing", asked.rules);
+    return fmt::format("The readable tree{} is the step with at most {} rule{}, as asked{}.", of, asked.rules,
+                       asked.rules == 1 ? "" : "s", none);
+  }
+  const std::string best = number(simple.yardstick);
+  const std::string whose = simple.yardstick < smallest_crisp(full) ? "the smallest error of such trees"
+                                                                    : "the error of the best crisp tree";
+  if (simple.is_within_loss) {
+    return fmt::format("When it was chosen the readable tree{} was the smallest one at most {:g} % above {}, {}.", of,
+                       100.0 * asked.loss, best, whose);
+  }
+  return fmt::format("No short tree{} came within {:g} % of {}, {}; this one came nearest.", of, 100.0 * asked.loss, best,
+                     whose);
+}
+
+double per_cent_above(double rmse, double of_model) { return 100.0 * (rmse / of_model - 1.0); }
 
 // What reading costs beside the model that was chosen: "Reading costs 32 % more error (over the folds 26 to 41 %):
 // ...".
 std::string price_of(const ReadablePartition& simple, const CandidateError& chosen, const std::string& of) {
   if (!(chosen.rmse > 0.0)) return "";
-  const double cost = 100.0 * (simple.rmse / chosen.rmse - 1.0);
+  const double cost = per_cent_above(simple.rmse, chosen.rmse);
   if (cost < 0.0) {
     return fmt::format("The readable tree{} has a smaller held-out error than the model chosen above.", of);
   }
@@ -66,15 +84,76 @@ std::string price_of(const ReadablePartition& simple, const CandidateError& chos
                      number(simple.rmse), number(chosen.rmse));
 }
 
-constexpr Eigen::Index most_read_rules = 12;
+// What a person should know of the choice, in sentences.
+std::vector<std::string> sentences_on(const FitResult& fitted, const ReadableResult& readable, std::size_t p,
+                                      const ReadableOptions& asked) {
+  const ReadablePartition& simple = readable.partitions[p];
+  const PartitionSummary& full = fitted.summary.partitions[p];
+  const std::string of =
+      readable.partitions.size() > 1 ? " of " + fitted.model.outputs()[simple.outputs.front()].name : "";
+  std::vector<std::string> sentences;
+  if (std::string price = price_of(simple, full.chosen, of); !price.empty()) sentences.push_back(std::move(price));
+  if (simple.leaves > most_read_rules) {
+    sentences.push_back(
+        fmt::format("{} rules are more than a person reads: no short tree{} is near.", simple.leaves, of));
+  }
+  if (simple.rmse > full.best_of_kind.front().rmse) {
+    sentences.push_back(fmt::format("Least squares{} of all inputs has a smaller error.", of));
+  }
+  sentences.push_back(note_on(simple, full, of, asked));
+  return sentences;
+}
+
+// Steps that are shown: those that a person reads, the one that is taken, and the last.
+std::vector<std::size_t> shown_steps(const ReadablePartition& simple) {
+  std::vector<std::size_t> shown;
+  for (std::size_t k = 0; k < simple.path.size(); ++k) {
+    if (simple.path[k].leaves <= most_read_rules || k == simple.taken || k + 1 == simple.path.size())
+      shown.push_back(k);
+  }
+  return shown;
+}
 
 std::string count(Eigen::Index value) { return fmt::format("{}", value); }
 
+Json step_json(const ReadableStep& step, const CandidateError& chosen) {
+  Json json;
+  json["leaves"] = step.leaves;
+  json["most_terms"] = step.most_terms;
+  json["size"] = step.size;
+  json["cv_rmse"] = step.rmse;
+  json["spread"] = step.spread;
+  json["above_model"] = chosen.rmse > 0.0 ? Json(step.rmse / chosen.rmse - 1.0) : Json();
+  return json;
+}
+
+Grid steps_grid(const FitResult& fitted, const ReadableResult& readable) {
+  Grid grid{.header = {"target", "rules", "terms per rule", "size", "RMSE held-out", "above the model", ""},
+            .rows = {},
+            .words = {6},
+            .wide = true};
+  for (std::size_t p = 0; p < readable.partitions.size(); ++p) {
+    const ReadablePartition& simple = readable.partitions[p];
+    const double chosen = fitted.summary.partitions[p].chosen.rmse;
+    std::string name = fitted.model.outputs()[simple.outputs.front()].name;
+    for (const std::size_t k : shown_steps(simple)) {
+      const ReadableStep& step = simple.path[k];
+      const std::string above = chosen > 0.0 ? fmt::format("{:.0f} %", per_cent_above(step.rmse, chosen)) : "";
+      grid.rows.push_back({name, count(step.leaves), count(step.most_terms), count(step.size), number(step.rmse),
+                           above, k == simple.taken ? "taken" : ""});
+      name.clear();
+    }
+  }
+  return grid;
+}
+
 }  // namespace
 
-Json readable_json(const ReadableResult& readable) {
+Json readable_json(const FitResult& fitted, const ReadableResult& readable, const ReadableOptions& asked) {
   Json json = Json::array();
-  for (const ReadablePartition& partition : readable.partitions) {
+  for (std::size_t p = 0; p < readable.partitions.size(); ++p) {
+    const ReadablePartition& partition = readable.partitions[p];
+    const CandidateError& chosen = fitted.summary.partitions[p].chosen;
     Json entry;
     for (const int output : partition.outputs) entry["targets"].push_back(readable.model.outputs()[output].name);
     entry["leaves"] = partition.leaves;
@@ -83,19 +162,25 @@ Json readable_json(const ReadableResult& readable) {
     entry["size"] = partition.size;
     entry["cv_rmse"] = partition.rmse;
     entry["spread"] = partition.spread;
-    entry["best_crisp_cv_rmse"] = partition.best_crisp;
+    entry["yardstick_cv_rmse"] = partition.yardstick;
     entry["is_within_loss"] = partition.is_within_loss;
+    entry["taken"] = partition.taken;
+    entry["path"] = Json::array();
+    for (const ReadableStep& step : partition.path) entry["path"].push_back(step_json(step, chosen));
+    entry["sentences"] = sentences_on(fitted, readable, p, asked);
     json.push_back(std::move(entry));
   }
   return json;
 }
 
-Section readable_words(const FitResult& fitted, const ReadableResult& readable, double loss) {
+Section readable_words(const FitResult& fitted, const ReadableResult& readable, const ReadableOptions& asked) {
   Grid table{.header = {"target", "model", "leaves", "terms per leaf", "size", "RMSE held-out", "spread of folds"},
              .rows = {},
              .words = {1},
              .wide = true};
-  std::vector<std::string> notes = {"Size: operators, constants and variables of the model as an expression."};
+  std::vector<std::string> notes = {
+      "Size: operators, constants and variables of the model as an expression. Errors of readable trees are of rows on "
+      "which they were not chosen. --readable-rules N takes another step."};
   for (std::size_t p = 0; p < readable.partitions.size(); ++p) {
     const ReadablePartition& simple = readable.partitions[p];
     const PartitionSummary& full = fitted.summary.partitions[p];
@@ -112,18 +197,9 @@ Section readable_words(const FitResult& fitted, const ReadableResult& readable, 
     const CandidateError& linear = full.best_of_kind.front();
     const Model root = whole.prefix(1);
     add("", "least squares", 1, most_terms(root.partitions()[0]), expression_size(root), linear.rmse, linear.spread);
-    const std::string of = readable.partitions.size() > 1 ? " of " + target : "";
-    if (std::string price = price_of(simple, full.chosen, of); !price.empty()) notes.push_back(std::move(price));
-    if (simple.leaves > most_read_rules) {
-      notes.push_back(
-          fmt::format("{} rules are more than a person reads: no short tree{} is near.", simple.leaves, of));
-    }
-    if (simple.rmse > linear.rmse) {
-      notes.push_back(fmt::format("Least squares{} has a smaller error, and is shorter: read that.", of));
-    }
-    notes.push_back(note_on(simple, of, loss));
+    for (std::string& sentence : sentences_on(fitted, readable, p, asked)) notes.push_back(std::move(sentence));
   }
-  return {"What reading costs", "", {block(table), text_block("", notes)}};
+  return {"What reading costs", "", {block(table), block(steps_grid(fitted, readable)), text_block("", notes)}};
 }
 
 }  // namespace llmt::report

@@ -23,8 +23,9 @@ std::string wrapped_list(std::string line, const std::vector<std::string>& parts
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const std::string part = (i == 0 ? "" : between) + parts[i];
     if (i > 0 && line.size() + part.size() > line_width) {
-      text += line + "\n";
-      line = indent + part.substr(part.find_first_not_of(' '));
+      const bool by_comma = between.starts_with(",");  // it ends a line, and begins none
+      text += line + (by_comma ? ",\n" : "\n");
+      line = indent + (by_comma ? parts[i] : part.substr(part.find_first_not_of(' ')));
     } else {
       line += part;
     }
@@ -106,23 +107,6 @@ std::string inputs_text(const Model& model, std::size_t width) {
   return text;
 }
 
-// True if the model is what the rules say: no guard acts between the smallest and the largest value of each input, and
-// a missing value counts as the mean.
-bool says_all(const Model& model) {
-  for (const Partition& partition : model.partitions()) {
-    if (partition.residual_range.size() > 0) return partition.num_leaves() == 1 && partition.outer_slope.size() == 0;
-    for (const Node& node : partition.nodes) {
-      for (std::size_t k = 0; k < model.regressors().size(); ++k) {
-        const Regressor& regressor = model.regressors()[k];
-        if (regressor.level >= 0 || regressor.second_input >= 0) continue;
-        const InputColumn& input = model.inputs()[regressor.input];
-        if (node.low(k) > input.low - regressor.centre || node.high(k) < input.high - regressor.centre) return false;
-      }
-    }
-  }
-  return true;
-}
-
 std::string notes(const Model& model) {
   const bool one_rule =
       std::ranges::all_of(model.partitions(), [](const Partition& partition) { return partition.num_leaves() == 1; });
@@ -140,6 +124,23 @@ std::string notes(const Model& model) {
 }
 
 }  // namespace
+
+bool says_all(const Model& model) {
+  for (const Partition& partition : model.partitions()) {
+    if (partition.num_leaves() > 1 && partition.validity.kind != ValidityKind::crisp) return false;
+    if (partition.output_range.size() > 0) return false;
+    if (partition.residual_range.size() > 0) return partition.num_leaves() == 1 && partition.outer_slope.size() == 0;
+    for (const Node& node : partition.nodes) {
+      for (std::size_t k = 0; k < model.regressors().size(); ++k) {
+        const Regressor& regressor = model.regressors()[k];
+        if (regressor.level >= 0 || regressor.second_input >= 0) continue;
+        const InputColumn& input = model.inputs()[regressor.input];
+        if (node.low(k) > input.low - regressor.centre || node.high(k) < input.high - regressor.centre) return false;
+      }
+    }
+  }
+  return true;
+}
 
 std::string rules_text(const Model& model, const std::string& name, std::size_t width) {
   std::string text = fmt::format("{}: size {} (operators, constants and variables)\n", name, expression_size(model));

@@ -79,6 +79,12 @@ class EncodingError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Thrown for a text without a header row.
+class EmptyText : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// A CSV text with a header row, kept as text. A column is turned into numbers when it is requested, so a column of
 /// words does no harm unless it is requested as numbers. A request for several columns passes over the text once.
 ///

@@ -64,7 +64,7 @@ Csv Csv::parse(std::string text, std::string name, DecimalMark mark) {
 void Csv::read_header() {
   header_begin_ = csv::header_begin(text_);
   if (header_begin_ >= text_.size()) {
-    throw std::runtime_error(fmt::format("{}: the file is empty, a header row is needed", name_));
+    throw EmptyText(fmt::format("{}: the file is empty, a header row is needed", name_));
   }
   const std::string_view header = header_text();
   const char* const end = header.data() + header.size();

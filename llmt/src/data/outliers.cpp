@@ -17,6 +17,9 @@ constexpr double dominant_share = 0.9;
 constexpr Eigen::Index one_row_in = 100;
 constexpr double far_spreads = 20.0;
 
+// Of fewer rows any one may carry most of the squares.
+constexpr Eigen::Index fewest_rows_of_share = 10;
+
 }  // namespace
 
 RobustScale robust_scale(const Eigen::Ref<const Eigen::VectorXd>& values) {
@@ -47,6 +50,7 @@ DominantRows dominant_rows(const Eigen::Ref<const Eigen::VectorXd>& output) {
   }
   if (dominant.share < dominant_share) return {};
   dominant.hide_the_others = farthest * std::numeric_limits<double>::epsilon() > scale.deviation;
+  if (output.size() < fewest_rows_of_share && !dominant.hide_the_others) return {};
   return dominant;
 }
 

@@ -126,14 +126,30 @@ std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_p
   return chosen;
 }
 
-SelectionPath selection_path(const LocalSums& sums, Eigen::Index most) {
+SelectionPath selection_path(const LocalSums& sums, Eigen::Index most, const std::vector<Parents>& parents) {
   SelectionPath path;
   auto [correlation, total, remaining] = standardised(sums);
   std::vector<Eigen::VectorXd> rss = {total.matrix().cwiseProduct(remaining.rss)};
+  std::vector<bool> taken(remaining.variance.size(), false);
+  // The first parent of a regressor that is not in yet; itself if all are.
+  const auto first_missing = [&](Eigen::Index k) {
+    if (!parents.empty()) {
+      for (const Eigen::Index parent : parents[k]) {
+        if (parent >= 0 && !taken[parent]) return parent;
+      }
+    }
+    return k;
+  };
   while (std::ssize(path.regressors) < most && remaining.rss.maxCoeff() > rounding_of_squares) {
-    const Eigen::Index next = best_of(remaining);
-    if (next < 0) break;
+    const Eigen::Index best = best_of(remaining);
+    if (best < 0) break;
+    const Eigen::Index next = first_missing(best);
+    if (next != best && !(remaining.variance(next) > least_new_variance)) {
+      remaining.variance(best) = 0.0;
+      continue;
+    }
     take(next, correlation, std::ssize(path.regressors), remaining);
+    taken[next] = true;
     path.regressors.push_back(next);
     rss.emplace_back(total.matrix().cwiseProduct(remaining.rss.cwiseMax(0.0)));
   }

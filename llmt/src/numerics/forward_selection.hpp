@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <tuple>
 #include <vector>
 
@@ -35,7 +36,11 @@ struct SelectionPath {
       rss;  ///< residual sums of squares with the constant and the first 0, 1, 2, ... of them, one row an output
 };
 
-/// At most `most` regressors; fewer where the others say nothing new or the residuals are rounding.
-SelectionPath selection_path(const LocalSums& sums, Eigen::Index most);
+/// The regressors that must be in a model before this one, such as the factors of a product; -1: none.
+using Parents = std::array<Eigen::Index, 2>;
+
+/// At most `most` regressors; fewer where the others say nothing new or the residuals are rounding. With `parents`, one
+/// entry a regressor, the parents of the best regressor enter before it; it never does if one of them cannot.
+SelectionPath selection_path(const LocalSums& sums, Eigen::Index most, const std::vector<Parents>& parents = {});
 
 }  // namespace llmt

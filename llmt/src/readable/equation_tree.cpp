@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "partition/smooth_clamp.hpp"
 #include "partition/tree.hpp"
 #include "readable/decimal.hpp"
 
@@ -60,6 +59,13 @@ EquationTree::EquationTree(const Sample& sample, std::vector<Node> grown, std::v
   for (std::size_t t = 0; t < terms_.size(); ++t) {
     const Regressor& regressor = sample_.described.regressors[terms_[t].first];
     origin_.terms(t) = terms_[t].second < 0 ? regressor.centre : 0.0;
+  }
+  parents_ = parents_of(terms_);
+  if (const std::vector<int>& signs = sample_.described.table->slope_signs; !signs.empty()) {
+    for (const Term& term : terms_) {
+      const Regressor& regressor = sample_.described.regressors[term.first];
+      grains_.signs.push_back(regressor.level < 0 ? signs[regressor.input] : 0);
+    }
   }
   settle_splits(coarseness);
   add_sums();
@@ -195,7 +201,7 @@ void EquationTree::price_nodes() {
     const auto most = static_cast<Eigen::Index>(static_cast<double>(training_[i].size()) / rows_per_coefficient) - 1;
     SelectionPath path;
     if (!training_[i].empty()) {
-      path = selection_path(sums_[i], std::clamp<Eigen::Index>(most, 0, std::min(most_terms, std::ssize(terms_))));
+      path = signed_path(sums_[i], std::clamp<Eigen::Index>(most, 0, std::min(most_terms, std::ssize(terms_))));
       const Eigen::RowVectorXd errors = sample_.output_weights.transpose() * path.rss / total;
       priced.errors.assign(errors.begin(), errors.end());
       for (const Eigen::Index term : path.regressors) {
@@ -216,7 +222,7 @@ double EquationTree::schwarz_price() const {
     const double next = remaining * std::log(rows) / rows / symbols;
     if (step > 0 && next >= price) break;
     price = next;
-    const std::vector<int> tree = pruned(price);
+    const std::vector<int> tree = cheapest_tree(priced_, price);
     remaining = 0.0;
     for (const int node : nodes_of(priced_, tree)) {
       if (tree[node] != stays_split) remaining += priced_[node].errors[tree[node]];
@@ -227,7 +233,7 @@ double EquationTree::schwarz_price() const {
 }
 
 void EquationTree::choose_grains(double coarseness) {
-  const std::vector<int> tree = pruned(schwarz_price());
+  const std::vector<int> tree = cheapest_tree(priced_, schwarz_price());
   Eigen::VectorXd noise = Eigen::VectorXd::Zero(sample_.output_weights.size());
   for (const int node : nodes_of(priced_, tree)) {
     if (tree[node] != stays_split) noise += paths_[node].rss.col(tree[node]);
@@ -278,69 +284,6 @@ int EquationTree::equation_of(const std::vector<int>& tree, int node) const {
   if (tree[node] != stays_split) return tree[node];
   const int most = std::max(equation_of(tree, nodes_[node].left), equation_of(tree, nodes_[node].right));
   return std::min(most, static_cast<int>(priced_[node].errors.size()) - 1);
-}
-
-const EquationTree::Made& EquationTree::made(int node, int terms) {
-  const auto [found, is_new] = made_.try_emplace({node, terms});
-  if (is_new) {
-    found->second.equation = rounded_equation(sums_[node], paths_[node], terms, origin_, grains_);
-    found->second.held_out_error = held_out_error(node, found->second.equation);
-  }
-  return found->second;
-}
-
-// A term at a held-out row, as a deviation, by the guards that partition() leaves: numbers are held to the training
-// extent, except where the root is the only leaf.
-double EquationTree::held_term(const Term& term, const double* row, bool is_root) const {
-  const std::vector<InputColumn>& columns = sample_.described.columns;
-  const std::vector<Regressor>& regressors = sample_.described.regressors;
-  const Regressor& regressor = regressors[term.first];
-  const InputColumn& column = columns[regressor.input];
-  if (term.second >= 0) {
-    const InputColumn& second = columns[regressors[term.second].input];
-    return std::clamp(row[term.first], column.low - column.centre, column.high - column.centre) *
-           std::clamp(row[term.second], second.low - second.centre, second.high - second.centre);
-  }
-  if (is_root || regressor.level >= 0) return row[term.first];
-  return smooth_clamp(row[term.first], column.low - column.centre, column.high - column.centre);
-}
-
-double EquationTree::held_out_error(int node, const Equation& equation) const {
-  const RowValues& values = sample_.held_out;
-  return sum_of_rows(std::ssize(held_out_[node]), [&](Eigen::Index i) {
-    const int row = held_out_[node][i];
-    const double* deviations = values.deviations.row(row).data();
-    Eigen::VectorXd error = values.outputs.row(row).transpose() - equation.intercept;
-    for (std::size_t t = 0; t < equation.terms.size(); ++t) {
-      const Eigen::Index term = equation.terms[t];
-      error -= equation.slope.col(t) * (held_term(terms_[term], deviations, node == 0) + origin_.terms(term));
-    }
-    return values.weights(row) * sample_.output_weights.dot(error.cwiseAbs2());
-  });
-}
-
-double EquationTree::held_out_error(const std::vector<int>& tree) {
-  double sum = 0.0;
-  for (const int node : nodes_of(priced_, tree)) {
-    if (tree[node] != stays_split) sum += made(node, tree[node]).held_out_error;
-  }
-  return sum;
-}
-
-Eigen::Index EquationTree::size(const std::vector<int>& tree) {
-  Eigen::Index size = 0;
-  for (const int node : nodes_of(priced_, tree)) {
-    if (tree[node] == stays_split) {
-      size += priced_[node].split_size;
-      continue;
-    }
-    const Equation& equation = made(node, tree[node]).equation;
-    size += equation.slope.rows();
-    for (std::size_t t = 0; t < equation.terms.size(); ++t) {
-      size += (equation.slope.col(t).array() != 0.0).count() * size_of_term(sample_, terms_[equation.terms[t]]);
-    }
-  }
-  return size;
 }
 
 }  // namespace llmt

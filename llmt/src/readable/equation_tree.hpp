@@ -12,6 +12,13 @@
 
 namespace llmt {
 
+/// How long a tree is.
+struct TreeExtent {
+  Eigen::Index size = 0;        ///< of the expression, as expression_size() counts
+  Eigen::Index rules = 0;       ///< leaves
+  Eigen::Index most_terms = 0;  ///< of the leaf that has most
+};
+
 class EquationTree {
  public:
   /// `grown`: the nodes of a tree, of which only the splits count. Thresholds and coefficients are rounded: those that
@@ -19,8 +26,10 @@ class EquationTree {
   /// `sample` must live as long as the tree.
   EquationTree(const Sample& sample, std::vector<Node> grown, std::vector<Term> terms, double coarseness);
 
-  /// The cheapest tree at a price for one symbol, in mean square error: see cheapest_tree().
-  std::vector<int> pruned(double price) const { return cheapest_tree(priced_, price); }
+  /// The cheapest tree at a price for one symbol, in mean square error: see cheapest_tree(). Where trends are asked for,
+  /// slopes have their signs, and of a monotone input a split at which a prediction steps against the trend is undone,
+  /// the lowest first.
+  std::vector<int> pruned(double price);
 
   /// The price of a symbol at which a term pays if it lowers the sum of squares by ln N times the variance that the
   /// cheapest tree at this very price leaves (Schwarz 1978): prices from that of the constant down are tried.
@@ -32,8 +41,8 @@ class EquationTree {
   /// Weighted squared error of the rounded tree over the held-out rows.
   double held_out_error(const std::vector<int>& pruned);
 
-  /// Size of the rounded tree's expression, as expression_size() counts.
-  Eigen::Index size(const std::vector<int>& pruned);
+  /// Of the rounded tree.
+  TreeExtent extent(const std::vector<int>& pruned);
 
   /// Mean square error over the training rows that a constant leaves.
   double variance() const { return priced_[0].errors[0]; }
@@ -56,6 +65,9 @@ class EquationTree {
   void price_nodes();
   void choose_grains(double coarseness);
   const Made& made(int node, int terms);
+  SelectionPath signed_path(const LocalSums& sums, Eigen::Index most) const;
+  Eigen::Index wrong_term(const LocalSums& sums, const SelectionPath& path) const;
+  int last_disorder(const std::vector<int>& pruned);
   double held_out_error(int node, const Equation& equation) const;
   int equation_of(const std::vector<int>& pruned, int node) const;
   double held_term(const Term& term, const double* row, bool is_root) const;
@@ -64,6 +76,7 @@ class EquationTree {
   const Sample& sample_;
   std::vector<Node> nodes_;
   std::vector<Term> terms_;
+  std::vector<Parents> parents_;  // of each term, positions of the main terms of a product
   Origin origin_;
   std::vector<std::vector<int>> training_;  // rows of every node
   std::vector<std::vector<int>> held_out_;

@@ -66,18 +66,20 @@ std::vector<int> usable_inputs(const Sample& sample) {
 EquationTree with_terms(const Sample& sample, std::vector<Node> grown, const std::vector<int>& inputs,
                         const Form& form) {
   const std::vector<int> of_terms = common(sample.described.table->regression_inputs, inputs);
-  const bool products = form.products && std::ssize(of_terms) <= most_inputs_of_products;
+  // A product has the slope of one factor depend on the other: no trend is kept so.
+  const bool products = form.products && std::ssize(of_terms) <= most_inputs_of_products &&
+                        sample.described.table->slope_signs.empty();
   return {sample, std::move(grown), terms_of(sample, of_terms, products), form.coarseness};
 }
 
-Eigen::VectorXd importance_of(const EquationTree& tree) { return tree.importance(tree.pruned(tree.schwarz_price())); }
+Eigen::VectorXd importance_of(EquationTree& tree) { return tree.importance(tree.pruned(tree.schwarz_price())); }
 
 std::vector<JudgedTree> judge(EquationTree& tree) {
   std::vector<JudgedTree> judged;
   std::vector<int> before;
   for (std::size_t price = 0; price < prices; ++price) {
     std::vector<int> pruned = tree.pruned(price_of(tree, price));
-    judged.push_back(pruned == before ? judged.back() : JudgedTree{tree.held_out_error(pruned), tree.size(pruned)});
+    judged.push_back(pruned == before ? judged.back() : JudgedTree{tree.held_out_error(pruned), tree.extent(pruned)});
     before = std::move(pruned);
   }
   return judged;
@@ -101,7 +103,8 @@ EquationTree make_tree(const Sample& sample, const TreePlan& plan, const WalkSte
 std::vector<WalkStep> walk_inputs(const Sample& sample, const TreePlan& plan, Work& work) {
   std::vector<WalkStep> steps;
   std::vector<int> inputs = usable_inputs(sample);
-  Eigen::VectorXd importance = importance_of(with_terms(sample, std::vector<Node>(1), inputs, forms().front()));
+  EquationTree equation = with_terms(sample, std::vector<Node>(1), inputs, forms().front());
+  Eigen::VectorXd importance = importance_of(equation);
   while (true) {
     const Eigen::Index count = std::ssize(inputs);
     WalkStep& step = steps.emplace_back(

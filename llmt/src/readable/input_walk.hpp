@@ -35,7 +35,7 @@ struct TreeKey {
 /// A pruned tree.
 struct JudgedTree {
   double held_out_error = 0.0;  ///< weighted sum of squares
-  Eigen::Index size = 0;        ///< of its expression
+  TreeExtent extent;
 };
 
 /// A tree of a walk.

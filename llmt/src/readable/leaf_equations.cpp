@@ -1,6 +1,8 @@
 #include "readable/leaf_equations.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
 
 #include "readable/decimal.hpp"
 
@@ -10,10 +12,19 @@ namespace {
 // Keeps the factor of nearly collinear columns regular; a part of their sums of squares.
 constexpr double least_diagonal = 1e-12;
 
+// Whether a term that entered after the i-th one, and has a slope, asks for it.
+bool is_needed(const Equation& equation, Eigen::Index output, Eigen::Index i, const std::vector<Parents>& parents) {
+  for (Eigen::Index k = i + 1; !parents.empty() && k < std::ssize(equation.terms); ++k) {
+    const auto& of_term = parents[equation.terms[k]];
+    if (equation.slope(output, k) != 0.0 && std::ranges::find(of_term, equation.terms[i]) != of_term.end()) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Equation rounded_equation(const LocalSums& sums, const SelectionPath& path, Eigen::Index count, const Origin& origin,
-                          const Grains& grains) {
+                          const Grains& grains, const std::vector<Parents>& parents) {
   const double weight = sums.gram(0, 0);
   Equation equation{.terms = {path.regressors.begin(), path.regressors.begin() + count},
                     .intercept = origin.outputs + sums.products.row(0).transpose() / weight,
@@ -48,6 +59,10 @@ Equation rounded_equation(const LocalSums& sums, const SelectionPath& path, Eige
               .dot(equation.slope.row(o).tail(count - i - 1).transpose().cwiseProduct(length.tail(count - i - 1)));
       const double free = (right(i) - rest) / lower(i, i) / length(i);
       equation.slope(o, i) = rounded(free, grains.slopes[o][equation.terms[i]]);
+      if (equation.slope(o, i) == 0.0 && free != 0.0 && is_needed(equation, o, i, parents))
+        equation.slope(o, i) = rounded(free, exponent_below(std::abs(free)));
+      if (!grains.signs.empty() && grains.signs[equation.terms[i]] * equation.slope(o, i) < 0.0)
+        equation.slope(o, i) = 0.0;
     }
     double intercept = equation.intercept(o);
     for (Eigen::Index i = 0; i < count; ++i) {

@@ -16,10 +16,11 @@ struct Equation {
   Eigen::MatrixXd slope;            ///< outputs x terms
 };
 
-/// To which powers of ten coefficients are rounded.
+/// To which powers of ten coefficients are rounded, and which sign slopes keep.
 struct Grains {
   std::vector<int> intercept;            ///< one exponent an output
   std::vector<std::vector<int>> slopes;  ///< of each output, one exponent a term
+  std::vector<int> signs = {};           ///< of each term's slope: -1, 0 (any) or 1; empty: any
 };
 
 /// The values of terms and outputs at which the columns of sums are 0.
@@ -33,8 +34,10 @@ struct Origin {
 ///
 /// One slope after the other, the term that entered last first, is rounded at its least-squares value given those
 /// that are rounded already (Babai 1986, the nearest plane); then the intercept at its least-squares value given all
-/// slopes. Each coefficient thus makes up for the rounding of those before it.
+/// slopes. Each coefficient thus makes up for the rounding of those before it. A slope of a parent whose term has a
+/// slope keeps one digit, so that no product stands without its main terms. `parents`: one entry a term of `sums`, or
+/// empty. A slope that rounding gives the wrong sign becomes 0.
 Equation rounded_equation(const LocalSums& sums, const SelectionPath& path, Eigen::Index count, const Origin& origin,
-                          const Grains& grains);
+                          const Grains& grains, const std::vector<Parents>& parents = {});
 
 }  // namespace llmt

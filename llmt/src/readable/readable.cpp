@@ -5,14 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
 #include <span>
 #include <stdexcept>
-#include <tuple>
 
+#include "base/count.hpp"
 #include "base/parallel.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "fit/choices/code_choice.hpp"
@@ -25,31 +24,22 @@
 #include "model/codes.hpp"
 #include "model/held_out_intervals.hpp"
 #include "readable/input_walk.hpp"
+#include "readable/path.hpp"
 #include "selection/fold_errors.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
 // Held-out errors below this part of that of a constant are rounding.
 constexpr double rounding_error = 1e-8;
 
-// The smallest held-out error of a crisp tree of the fit; infinity if there was none.
-double best_crisp_of(const PartitionSummary& partition) {
-  double best = infinity;
-  for (const CandidateError& error : partition.best_of_kind) {
-    if (error.candidate.validity.kind == ValidityKind::crisp) best = std::min(best, error.rmse);
-  }
-  return best;
-}
-
-void check(const FitOptions& options, const FitSummary& fitted, double loss) {
+void check(const FitOptions& options, const FitSummary& fitted, const ReadableOptions& asked) {
   const auto refuse = [](const std::string& what) { throw std::invalid_argument("llmt::fit_readable: " + what); };
-  if (!(loss >= 0.0 && std::isfinite(loss))) {
-    refuse(fmt::format("loss is {}, it must be a finite number, 0 or more", loss));
+  if (!(asked.loss >= 0.0 && std::isfinite(asked.loss))) {
+    refuse(fmt::format("loss is {}, it must be a finite number, 0 or more", asked.loss));
   }
+  if (asked.rules < 0) refuse(fmt::format("rules is {}, it must be 1 or more, or 0 for the default", asked.rules));
   if (const std::string why = why_not_readable(options); !why.empty())
     refuse("a readable tree does not go with " + why);
   if (fitted.partitions.empty() || fitted.partitions.front().cv_folds == 0) {
@@ -57,7 +47,7 @@ void check(const FitOptions& options, const FitSummary& fitted, double loss) {
   }
 }
 
-// Everything but the loss.
+// Everything but what is asked of the choice.
 struct Setting {
   const Training& training;            // linear local models
   const std::vector<FoldRows>& folds;  // held-out rows as in the fit: of many a sample
@@ -76,56 +66,80 @@ std::vector<Sample> samples_of(const Setting& setting, const std::vector<int>& s
   return samples;
 }
 
-// The held-out error of one tree.
-CandidateError error_of(const std::vector<std::vector<WalkStep>>& walks, const FoldErrors& error_of_folds,
-                        const TreeKey& key) {
-  std::vector<double> sums;
-  for (std::size_t f = 0; f + 1 < walks.size(); ++f) {
-    sums.push_back(walks[f][key.step].trees[key.form][key.price].held_out_error);
-  }
-  return error_of_folds({}, sums);
-}
-
-// The smallest tree that is good enough, and how good it is.
-struct Choice {
-  TreeKey key;
-  CandidateError error;
-  double best_crisp = infinity;
-  bool is_within_loss = true;
-};
-
-Choice choose(const std::vector<std::vector<WalkStep>>& walks, const FoldErrors& error_of_folds, double best_crisp,
-              double loss) {
+std::vector<ComparedTree> compared_trees(const std::vector<std::vector<WalkStep>>& walks) {
   const std::vector<WalkStep>& final_walk = walks.back();
-  std::vector<std::pair<TreeKey, CandidateError>> trees;
-  Choice choice{.key = {}, .error = {}, .best_crisp = best_crisp, .is_within_loss = true};
+  std::vector<ComparedTree> trees;
   for (TreeKey key; key.step < final_walk.size(); ++key.step) {
     for (key.form = 0; key.form < final_walk[key.step].trees.size(); ++key.form) {
       for (key.price = 0; key.price < final_walk[key.step].trees[key.form].size(); ++key.price) {
-        trees.emplace_back(key, error_of(walks, error_of_folds, key));
-        // Products are there to make trees smaller, not to ask more of them.
-        if (!forms()[key.form].products) choice.best_crisp = std::min(choice.best_crisp, trees.back().second.rmse);
+        ComparedTree& tree = trees.emplace_back(ComparedTree{key, forms()[key.form].products, {}, {}});
+        for (std::size_t f = 0; f < walks.size(); ++f) {
+          const JudgedTree& judged = walks[f][key.step].trees[key.form][key.price];
+          tree.extents.push_back(judged.extent);
+          if (f + 1 < walks.size()) tree.squares.push_back(judged.held_out_error);
+        }
       }
     }
   }
-  // A tree of a constant is among them: the first of all prices is the variance.
-  const double least = rounding_error * trees.front().second.rmse;
-  const double most = (1.0 + loss) * std::max(choice.best_crisp, least);
-  const auto size_of = [&](const TreeKey& key) { return final_walk[key.step].trees[key.form][key.price].size; };
-  const std::pair<TreeKey, CandidateError>* best = nullptr;
-  for (const auto& tree : trees) {
-    if (!(tree.second.rmse <= most)) continue;
-    const auto rank = [&](const std::pair<TreeKey, CandidateError>& each) {
-      return std::tuple(size_of(each.first), each.first.form, each.second.rmse);
-    };
-    if (best == nullptr || rank(tree) < rank(*best)) best = &tree;
+  return trees;
+}
+
+// By which trees a path is measured. `trees`: as compared_trees(), the first a constant.
+PathRule path_rule(const Setting& setting, const PartitionSummary& partition, const std::vector<ComparedTree>& trees,
+                   double loss) {
+  PathRule rule{.loss = loss, .least = 0.0, .weights = {}, .crisp_squares = {}};
+  const double outputs = static_cast<double>(partition.outputs.size());
+  for (const FoldRows& fold : setting.folds) rule.weights.push_back(total_weight(fold.held_out) * outputs);
+  for (const CandidateError& error : partition.best_of_kind) {
+    if (error.candidate.validity.kind != ValidityKind::crisp || error.fold_rmse.size() != std::ssize(rule.weights))
+      continue;
+    std::vector<double>& squares = rule.crisp_squares.emplace_back();
+    for (std::size_t f = 0; f < rule.weights.size(); ++f)
+      squares.push_back(rule.weights[f] * error.fold_rmse(f) * error.fold_rmse(f));
   }
-  if (best == nullptr) {
-    choice.is_within_loss = false;
-    best = &*std::ranges::min_element(trees, {}, [](const auto& tree) { return tree.second.rmse; });
+  const double constant = std::sqrt(sum_of(trees.front().squares) / sum_of(rule.weights));
+  rule.least = rounding_error * constant;
+  return rule;
+}
+
+// What was chosen, and which trees the same choice takes where it does not see the held-out rows of a fold.
+struct Choice {
+  std::vector<ReadableStep> steps;
+  std::size_t taken = 0;
+  double yardstick = 0.0;
+  bool is_within_loss = true;
+  std::vector<TreeKey> keys;  ///< of the folds and, last, of all rows
+};
+
+Choice choose(const Setting& setting, const std::vector<std::vector<WalkStep>>& walks,
+              const PartitionSummary& partition, const ReadableOptions& options) {
+  const std::vector<ComparedTree> trees = compared_trees(walks);
+  const PathRule rule = path_rule(setting, partition, trees, options.loss);
+  const int folds = count_of(setting.folds);
+  const Path path = path_of(trees, rule, -1);
+  // What is said of a step is the error of the choice itself: in each fold that of the tree which the other folds
+  // choose. A single fold has no others, and many rows.
+  std::vector<Path> of_others;
+  for (int f = 0; f < folds; ++f) of_others.push_back(folds > 1 ? path_of(trees, rule, f) : path);
+  const auto step_of = [&](const Path& other, std::size_t step) {
+    return other.steps[step == path.chosen ? other.chosen : other.with_rules(path.rules[step])];
+  };
+  const FoldErrors error_of_folds(setting.folds, std::ssize(partition.outputs));
+  Choice choice{.steps = {},
+                .taken = options.rules > 0 ? path.with_rules(options.rules) : path.chosen,
+                .yardstick = path.yardstick,
+                .is_within_loss = path.is_within_loss,
+                .keys = {}};
+  for (std::size_t step = 0; step < path.steps.size(); ++step) {
+    std::vector<double> squares;
+    for (int f = 0; f < folds; ++f) squares.push_back(trees[step_of(of_others[f], step)].squares[f]);
+    const CandidateError error = error_of_folds({}, squares);
+    const TreeExtent& extent = trees[path.steps[step]].extents.back();
+    choice.steps.push_back(
+        {extent.rules, extent.most_terms, extent.size, error.rmse, error.spread, error.fold_rmse});
   }
-  choice.key = best->first;
-  choice.error = best->second;
+  for (int f = 0; f < folds; ++f) choice.keys.push_back(trees[step_of(of_others[f], choice.taken)].key);
+  choice.keys.push_back(trees[path.steps[choice.taken]].key);
   return choice;
 }
 
@@ -142,10 +156,10 @@ struct ReadableTrees {
   Choice choice;
 };
 
-std::unique_ptr<ReadableTrees> find_trees(const Setting& setting, const std::vector<int>& served, double best_crisp,
-                                          double loss, Work& work) {
+std::unique_ptr<ReadableTrees> find_trees(const Setting& setting, const PartitionSummary& partition,
+                                          const ReadableOptions& options, Work& work) {
   auto made = std::make_unique<ReadableTrees>();
-  made->samples = samples_of(setting, served);
+  made->samples = samples_of(setting, partition.outputs);
   const Eigen::Index count = std::ssize(made->samples);
   std::vector<std::vector<WalkStep>> walks(count);
   constexpr double share_of_walks = 0.9;
@@ -153,11 +167,11 @@ std::unique_ptr<ReadableTrees> find_trees(const Setting& setting, const std::vec
     Work walk(work, share_of_walks / static_cast<double>(count));
     walks[f] = walk_inputs(made->samples[f], setting.plan, walk);
   });
-  made->choice = choose(walks, FoldErrors(setting.folds, std::ssize(served)), best_crisp, loss);
-  const TreeKey& key = made->choice.key;
+  made->choice = choose(setting, walks, partition, options);
   made->trees.resize(count);
   parallel_for(count, setting.plan.max_threads, [&](Eigen::Index f) {
     if (!setting.training.options.intervals && f + 1 < count) return;
+    const TreeKey& key = made->choice.keys[f];
     EquationTree tree = make_tree(made->samples[f], setting.plan, walks[f][key.step], forms()[key.form]);
     std::vector<int> pruned = tree.pruned(price_of(tree, key.price));
     made->trees[f].emplace(ChosenTree{std::move(tree), std::move(pruned)});
@@ -216,10 +230,13 @@ ReadablePartition describe(const Model& model, std::size_t p, const Choice& choi
     alone.outputs[o] = static_cast<int>(o);
   }
   result.size = expression_size(Model(model.inputs(), outputs, model.regressors(), {alone}));
-  result.rmse = choice.error.rmse;
-  result.fold_rmse = choice.error.fold_rmse;
-  result.spread = choice.error.spread;
-  result.best_crisp = choice.best_crisp;
+  const ReadableStep& taken = choice.steps[choice.taken];
+  result.rmse = taken.rmse;
+  result.fold_rmse = taken.fold_rmse;
+  result.spread = taken.spread;
+  result.path = choice.steps;
+  result.taken = choice.taken;
+  result.yardstick = choice.yardstick;
   result.is_within_loss = choice.is_within_loss;
   return result;
 }
@@ -241,9 +258,9 @@ Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr
 
 }  // namespace
 
-ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitted, double loss,
+ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitted, const ReadableOptions& asked,
                             const Progress& progress) {
-  check(prepared.rows().training->options, fitted, loss);
+  check(prepared.rows().training->options, fitted, asked);
   Work work(progress);
   const std::shared_ptr<const Training> training = with_terms(prepared.rows().training, LocalTerms::linear, work);
   const FitOptions& options = training->options;
@@ -261,7 +278,7 @@ ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitte
   const double share = work.left();
   for (const PartitionSummary& partition : fitted.partitions) {
     Work part(work, share / static_cast<double>(fitted.partitions.size()));
-    parts.push_back(find_trees(setting, partition.outputs, best_crisp_of(partition), loss, part));
+    parts.push_back(find_trees(setting, partition, asked, part));
   }
   ReadableResult result{
       .model = assemble(parts, folds.size(), options.max_threads, work), .partitions = {}, .intervals = {}};
@@ -290,9 +307,6 @@ std::string why_not_readable(const FitOptions& options) {
       if (rule.overlapping == ValidityKind::gaussian) names.push_back(rule.name);
     }
     return fmt::format("rule {}: {}", fmt::join(names, " or "), by_crisp);
-  }
-  if (std::ranges::any_of(options.trends, [](Trend trend) { return trend != Trend::any; })) {
-    return "trends: its equations do not keep them";
   }
   return "";
 }

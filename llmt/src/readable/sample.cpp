@@ -99,6 +99,18 @@ std::vector<Term> terms_of(const Sample& sample, const std::vector<int>& inputs,
   return terms;
 }
 
+std::vector<Parents> parents_of(const std::vector<Term>& terms) {
+  std::vector<Parents> parents(terms.size(), {-1, -1});
+  const auto main_of = [&](int regressor) -> Eigen::Index {
+    const auto is_main = [&](const Term& term) { return term.second < 0 && term.first == regressor; };
+    return std::ranges::find_if(terms, is_main) - terms.begin();
+  };
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (terms[t].second >= 0) parents[t] = {main_of(terms[t].first), main_of(terms[t].second)};
+  }
+  return parents;
+}
+
 Eigen::Index size_of_term(const Sample& sample, const Term& term) {
   const auto factor = [&](int k) -> Eigen::Index {
     return sample.described.columns[sample.described.regressors[k].input].centre == 0.0 ? 1 : 3;

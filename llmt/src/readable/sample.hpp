@@ -8,6 +8,7 @@
 #include "base/matrix.hpp"
 #include "base/sum_over.hpp"
 #include "data/fold_rows.hpp"
+#include "numerics/forward_selection.hpp"
 
 namespace llmt {
 
@@ -50,6 +51,9 @@ struct Term {
 
 /// The terms of the given inputs: their regressors and, with `products`, products and squares of numbers.
 std::vector<Term> terms_of(const Sample& sample, const std::vector<int>& inputs, bool products);
+
+/// The positions of each product's main terms; all -1 of a regressor.
+std::vector<Parents> parents_of(const std::vector<Term>& terms);
 
 /// The size that a term adds to an expression, coefficient and operators included (expression_size()).
 Eigen::Index size_of_term(const Sample& sample, const Term& term);

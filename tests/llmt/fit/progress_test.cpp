@@ -159,7 +159,7 @@ TEST(Progress, OfAReadableTree) {
   const llmt::PreparedFit prepared({data.x, data.y}, options);
   const llmt::FitSummary fitted = llmt::fit(prepared).summary;
   const Call call = [&](const llmt::Progress& progress) {
-    return to_json(llmt::fit_readable(prepared, fitted, 0.15, progress).model);
+    return to_json(llmt::fit_readable(prepared, fitted, {}, progress).model);
   };
   watched::expect_rising(watched::reports_of(call));
   watched::expect_stops_at_every_report(call, 5);

@@ -184,7 +184,7 @@ TEST(NumbersOfOptions, OfFitsBeyondMemoryOfReadableTreesAndOfComparisons) {
   const llmt::FitResult fitted = llmt::fit(prepared);
   for (const double value : numbers) {
     expect_finite_or_refused(fmt::format("readable loss {}", value), [&] {
-      return is_finite(llmt::fit_readable(prepared, fitted.summary, value).model, prepared.data().inputs);
+      return is_finite(llmt::fit_readable(prepared, fitted.summary, {.loss = value}).model, prepared.data().inputs);
     });
   }
   const std::vector<llmt::Method> method = {{.name = "tree", .options = {}}};

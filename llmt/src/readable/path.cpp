@@ -1,0 +1,100 @@
+#include "readable/path.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+
+namespace llmt {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// A step is the shortest tree with its number of rules whose error is at most this much above the smallest there.
+constexpr double tolerance_of_step = 0.02;
+
+// A step that has more rules than another and not this much less error is none.
+constexpr double least_gain_of_step = 0.01;
+
+double error_without(const std::vector<double>& squares, const std::vector<double>& weights, int left_out) {
+  double sum = 0.0;
+  double weight = 0.0;
+  for (int f = 0; f < static_cast<int>(squares.size()); ++f) {
+    if (f == left_out) continue;
+    sum += squares[f];
+    weight += weights[f];
+  }
+  return std::sqrt(sum / weight);
+}
+
+// The trees of one number of rules.
+struct Group {
+  std::vector<std::size_t> trees;
+  double smallest = infinity;
+};
+
+}  // namespace
+
+std::size_t Path::with_rules(Eigen::Index most) const {
+  const auto behind = std::ranges::upper_bound(rules, most);
+  return behind == rules.begin() ? 0 : static_cast<std::size_t>(behind - rules.begin()) - 1;
+}
+
+Path path_of(const std::vector<ComparedTree>& trees, const PathRule& rule, int left_out) {
+  const auto extent_of = [&](std::size_t i) -> const TreeExtent& {
+    return left_out < 0 ? trees[i].extents.back() : trees[i].extents[left_out];
+  };
+  std::vector<double> errors;
+  std::map<Eigen::Index, Group> groups;
+  double equation = infinity;  // the best single one without products
+  Path path{.steps = {}, .chosen = 0, .yardstick = infinity, .is_within_loss = true, .rules = {}};
+  for (std::size_t i = 0; i < trees.size(); ++i) {
+    const double error = errors.emplace_back(error_without(trees[i].squares, rule.weights, left_out));
+    Group& group = groups[extent_of(i).rules];
+    group.trees.push_back(i);
+    group.smallest = std::min(group.smallest, error);
+    // Products are there to make trees smaller, not to ask more of them.
+    if (trees[i].has_products) continue;
+    path.yardstick = std::min(path.yardstick, error);
+    if (extent_of(i).rules == 1) equation = std::min(equation, error);
+  }
+  for (const std::vector<double>& squares : rule.crisp_squares)
+    path.yardstick = std::min(path.yardstick, error_without(squares, rule.weights, left_out));
+  const auto shortest = [&](const std::vector<std::size_t>& among, const auto& is_good) {
+    const auto rank = [&](std::size_t i) { return std::tuple(extent_of(i).size, trees[i].key.form, errors[i]); };
+    std::size_t best = trees.size();
+    for (const std::size_t i : among) {
+      if (is_good(i) && (best == trees.size() || rank(i) < rank(best))) best = i;
+    }
+    return best;
+  };
+  const double limit = (1.0 + rule.loss) * std::max(path.yardstick, rule.least);
+  std::size_t chosen = trees.size();
+  for (const auto& [rules, group] : groups) {
+    const double by_equation = (rules == 1 ? 1.0 + tolerance_of_step : 1.0) * equation;
+    const double most = std::min(limit, std::max(by_equation, rule.least));
+    const std::size_t best = shortest(group.trees, [&](std::size_t i) { return errors[i] <= most; });
+    if (best == trees.size()) continue;
+    chosen = chosen == trees.size() ? best : shortest({chosen, best}, [](std::size_t) { return true; });
+  }
+  path.is_within_loss = chosen < trees.size();
+  if (!path.is_within_loss) {
+    chosen = static_cast<std::size_t>(std::ranges::min_element(errors) - errors.begin());
+  }
+  double smallest = infinity;
+  for (const auto& [rules, group] : groups) {
+    const bool is_chosen = extent_of(chosen).rules == rules;
+    const double most = std::max((1.0 + tolerance_of_step) * group.smallest, rule.least);
+    const std::size_t step =
+        is_chosen ? chosen : shortest(group.trees, [&](std::size_t i) { return errors[i] <= most; });
+    if (!is_chosen && !(errors[step] < (1.0 - least_gain_of_step) * smallest)) continue;
+    smallest = std::min(smallest, errors[step]);
+    if (is_chosen) path.chosen = path.steps.size();
+    path.steps.push_back(step);
+    path.rules.push_back(rules);
+  }
+  return path;
+}
+
+}  // namespace llmt
