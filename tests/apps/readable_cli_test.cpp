@@ -114,7 +114,9 @@ class PrintedRules {
       rest = end == std::string::npos ? "" : rest.substr(end + 5);
       if (const std::size_t in = part.find(" in {"); in != std::string::npos) {
         const std::string levels = ", " + part.substr(in + 5, part.size() - in - 6) + ", ";
-        if (levels.find(", " + row.words.at(part.substr(0, in)) + ", ") == std::string::npos) return false;
+        const bool is_not = in >= 4 && part.substr(in - 4, 4) == " not";
+        const std::string& word = row.words.at(part.substr(0, is_not ? in - 4 : in));
+        if ((levels.find(", " + word + ", ") == std::string::npos) != is_not) return false;
         continue;
       }
       if (const std::size_t is = part.find(" = "); is != std::string::npos) {
@@ -377,6 +379,49 @@ TEST(ReadableProgram, KeepsAMonotoneInput) {
   const Eigen::VectorXd y = llmt::Csv::read(folder.file("p.csv")).numbers("y_pred");
   EXPECT_GT(y(399) - y(0), 3.0);
   EXPECT_LE((y.head(399) - y.tail(399)).maxCoeff(), 1e-12);
+}
+
+TEST(ReadableProgram, InputsFarFromZeroAreCountedFromTheirMiddle) {
+  const Folder folder;
+  llmt::Random random(14);
+  std::string text = "seconds,b,y\n";
+  std::vector<Row> data(300);
+  for (Row& row : data) {
+    row.numbers["seconds"] = 1.7e9 + std::floor(random.uniform(0.0, 1e6));
+    row.numbers["b"] = random.uniform(-1.0, 1.0);
+    row.numbers["y"] = 20.0 + 3e-6 * (row.numbers["seconds"] - 1.7e9) + row.numbers["b"] + 0.1 * random.normal();
+    text += fmt::format("{},{},{}\n", row.numbers["seconds"], row.numbers["b"], row.numbers["y"]);
+  }
+  folder.write("d.csv", text);
+  ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o m.json --validity crisp --max-leaves 2").exit_code, 0);
+  ASSERT_EQ(folder.run(llmt_program + " predict m.json d.csv -o p.csv").exit_code, 0);
+  const Outcome printed = folder.run(llmt_program + " inspect m.json --rules");
+  ASSERT_EQ(printed.exit_code, 0) << printed.err;
+  EXPECT_NE(printed.out.find("(seconds - 1700"), std::string::npos) << printed.out;
+  const PrintedRules rules(printed.out);
+  const Eigen::VectorXd y = llmt::Csv::read(folder.file("p.csv")).numbers("y_pred");
+  // Five digits of every number: 1e-4 of what the terms move.
+  for (std::size_t i = 0; i < data.size(); ++i) EXPECT_NEAR(rules(data[i]), y(static_cast<int>(i)), 5e-3);
+}
+
+TEST(ReadableProgram, LongSetsOfCategoriesAreNamedOnce) {
+  const Folder folder;
+  llmt::Random random(16);
+  std::string text = "town,a,y\n";
+  for (int i = 0; i < 600; ++i) {
+    const int town = i % 16;
+    const double a = random.uniform(0.0, 10.0);
+    const double y = town % 2 == 0 ? (a > 5.0 ? 30.0 - a : a) : (a > 3.0 ? -20.0 + a : 3.0 * a);
+    text += fmt::format("town_number_{},{},{}\n", town, a, y + 0.1 * random.normal());
+  }
+  folder.write("d.csv", text);
+  ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o m.json --readable=5").exit_code, 0);
+  const Outcome printed = folder.run(llmt_program + " inspect m.readable.json --rules");
+  const std::string& out = printed.out;
+  ASSERT_NE(out.find("set 1 = {town_number_"), std::string::npos) << out;
+  EXPECT_NE(out.find("town in set 1"), std::string::npos) << out;
+  const std::string set = out.substr(out.find("= {") + 2, out.find("}", out.find("= {")) - out.find("= {") - 1);
+  EXPECT_EQ(out.find(set, out.find(set) + 1), std::string::npos) << set;
 }
 
 TEST(ReadableProgram, IsExportedAsIfAndEquations) {

@@ -62,9 +62,25 @@ Condition oblique(const std::vector<InputColumn>& inputs, const Node& node, cons
   return {text, sign + (rounded ? number(threshold, 3) : decimal(threshold))};
 }
 
-std::string factor(const InputColumn& input) {
-  if (input.centre == 0.0) return input.name;
-  return fmt::format("({} {} {})", input.name, input.centre < 0.0 ? "+" : "-", decimal(std::abs(input.centre)));
+std::string about(const std::string& name, double centre) {
+  if (centre == 0.0) return name;
+  return fmt::format("({} {} {})", name, centre < 0.0 ? "+" : "-", decimal(std::abs(centre)));
+}
+
+std::string factor(const InputColumn& input) { return about(input.name, input.centre); }
+
+// Where an equation begins to count an input: 0, but near the mean, at a number of few digits, of an input whose values
+// lie far from 0, such as years. There the constant says what is predicted for a usual value, and not for year 0.
+double centre_in_print(const InputColumn& input) {
+  constexpr double far = 3.0;  // ranges
+  const double range = input.high - input.low;
+  if (!(range > 0.0 && std::isfinite(range)) || std::min(std::abs(input.low), std::abs(input.high)) <= far * range ||
+      (input.low < 0.0) != (input.high < 0.0))
+    return 0.0;
+  const double unit = std::pow(10.0, std::floor(std::log10(0.1 * range)));
+  const double centre = unit < 1.0 ? std::round(input.centre * std::round(1.0 / unit)) / std::round(1.0 / unit)
+                                   : std::round(input.centre / unit) * unit;
+  return std::isfinite(centre) ? centre : 0.0;
 }
 
 // "in {blue, red}", "= blue"
@@ -74,9 +90,9 @@ std::string among(const InputColumn& input, const std::vector<int>& levels) {
   std::vector<int> others(input.levels.size());
   std::iota(others.begin(), others.end(), 0);
   std::erase_if(others, [&](int level) { return std::ranges::find(levels, level) != levels.end(); });
-  constexpr std::size_t much_shorter = 4;
-  const bool by_others = !others.empty() && much_shorter * others.size() <= levels.size();
-  return fmt::format("{} {{{}}}", by_others ? "not in" : "in", quoted_levels(input, by_others ? others : levels));
+  const std::string in = fmt::format("in {{{}}}", quoted_levels(input, levels));
+  const std::string not_in = fmt::format("not in {{{}}}", quoted_levels(input, others));
+  return !others.empty() && not_in.size() < in.size() ? not_in : in;
 }
 
 }  // namespace
@@ -153,8 +169,12 @@ std::vector<std::string> equation(const std::vector<InputColumn>& inputs, const 
   for (std::size_t k = 0; k < regressors.size(); ++k) {
     if (slope(k) == 0.0) continue;
     magnitude += std::abs(slope(k) * regressors[k].centre);
+    const InputColumn& input = inputs[regressors[k].input];
+    const bool is_number = regressors[k].level < 0 && regressors[k].second_input < 0;
+    const double centre = is_number ? centre_in_print(input) : 0.0;
+    intercept += slope(k) * centre;
     parts.push_back(fmt::format("{} {} {}", slope(k) < 0.0 ? "-" : "+", decimal(std::abs(slope(k))),
-                                regressor_name(inputs, regressors[k])));
+                                is_number ? about(input.name, centre) : regressor_name(inputs, regressors[k])));
   }
   parts[0] = decimal_within(intercept, 1e-13 * magnitude);
   return parts;

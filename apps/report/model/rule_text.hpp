@@ -17,7 +17,7 @@ std::string decimal(double value, std::optional<double> tolerance = {});
 /// Categories, separated by commas; one with a comma or a quote stands in quotes, as in a CSV file.
 std::string quoted_levels(const InputColumn& input, const std::vector<int>& levels);
 
-/// "colour = blue", "colour in {blue, red}"; "colour not in {green}" where at least four times as many are in as not.
+/// "colour = blue", "colour in {blue, red}"; "colour not in {green}" where that is shorter.
 std::string levels_text(const InputColumn& input, const std::vector<int>& levels);
 
 /// What is compared, and how: "age", "<= 21".
@@ -38,7 +38,8 @@ std::vector<std::string> conditions_of(const std::vector<InputColumn>& inputs, c
                                        const Leaf& leaf);
 
 /// The terms of the equation intercept + slope . regressors with their signs: "12.3", "+ 0.45 cement", "- 1.2 water". A
-/// product's factors stand about their means: "- 0.3 (x - 2)*(y + 1)".
+/// product's factors stand about their means: "- 0.3 (x - 2)*(y + 1)", and so does an input whose values lie more than
+/// three of their ranges from 0: "+ 0.62 (year - 2015)".
 std::vector<std::string> equation(const std::vector<InputColumn>& inputs, const std::vector<Regressor>& regressors,
                                   double intercept, const Eigen::RowVectorXd& slope);
 

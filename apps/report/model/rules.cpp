@@ -67,6 +67,43 @@ std::string tree_text(const Model& model, const Partition& partition, const std:
   return text;
 }
 
+std::size_t count_in(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + part.size())) ++count;
+  return count;
+}
+
+// The text with a name in the place of each long set of categories that occurs several times, and what the names mean
+// before it.
+std::string with_named_sets(const Model& model, const Partition& partition, const std::vector<Leaf>& leaves,
+                            std::string text) {
+  constexpr std::size_t long_set = 30;
+  std::vector<std::string> sets;
+  const auto offer = [&](const std::string& condition) {
+    const std::size_t begin = condition.find('{');
+    if (begin == std::string::npos || condition.size() - begin < long_set) return;
+    const std::string set = condition.substr(begin);
+    if (std::ranges::find(sets, set) == sets.end() && count_in(text, set) > 1) sets.push_back(set);
+  };
+  for (const Leaf& leaf : leaves) {
+    for (std::size_t j = 0; j < leaf.levels.size(); ++j) {
+      if (!leaf.levels[j].empty()) offer(levels_text(model.inputs()[j], leaf.levels[j]).substr(model.inputs()[j].name.size()));
+    }
+  }
+  for (const Node& node : partition.nodes) {
+    if (node.is_leaf() || node.level_side.empty()) continue;
+    for (const bool left : {true, false}) offer(condition(model.inputs(), node, left).how);
+  }
+  std::string meanings;
+  for (std::size_t k = 0; k < sets.size(); ++k) {
+    const std::string name = fmt::format("set {}", k + 1);
+    for (std::size_t at = text.find(sets[k]); at != std::string::npos; at = text.find(sets[k], at + name.size()))
+      text.replace(at, sets[k].size(), name);
+    meanings += fmt::format("{} = {}\n", name, sets[k]);
+  }
+  return meanings.empty() ? text : meanings + "\n" + text;
+}
+
 std::string partition_text(const Model& model, Eigen::Index p) {
   const Partition& partition = model.partitions()[p];
   const std::vector<Leaf> leaves = model.leaves(p);
@@ -85,7 +122,7 @@ std::string partition_text(const Model& model, Eigen::Index p) {
     text += "\n";
   }
   if (leaves.size() > 1) text += "As a tree:\n" + tree_text(model, partition, leaves) + "\n";
-  return text;
+  return with_named_sets(model, partition, leaves, std::move(text));
 }
 
 std::string inputs_text(const Model& model, std::size_t width) {

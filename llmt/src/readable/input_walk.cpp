@@ -88,7 +88,8 @@ std::vector<JudgedTree> judge(EquationTree& tree) {
 }  // namespace
 
 const std::vector<Form>& forms() {
-  static const std::vector<Form> all = {{false, 1.0}, {false, 0.1}, {true, 1.0}, {true, 0.1}};
+  static const std::vector<Form> all = {{false, 1.0}, {false, 0.1},        {true, 1.0},
+                                        {true, 0.1},  {false, 1.0, false}, {false, 0.1, false}};
   return all;
 }
 
@@ -97,7 +98,7 @@ double price_of(const EquationTree& tree, std::size_t price) {
 }
 
 EquationTree make_tree(const Sample& sample, const TreePlan& plan, const WalkStep& step, const Form& form) {
-  return with_terms(sample, grow(sample, plan, step), step.inputs, form);
+  return with_terms(sample, form.splits ? grow(sample, plan, step) : std::vector<Node>(1), step.inputs, form);
 }
 
 std::vector<WalkStep> walk_inputs(const Sample& sample, const TreePlan& plan, Work& work) {
@@ -111,9 +112,9 @@ std::vector<WalkStep> walk_inputs(const Sample& sample, const TreePlan& plan, Wo
         WalkStep{inputs, most_important(inputs, importance, std::min(count, most_growth_inputs)), {}});
     const std::vector<Node> grown = grow(sample, plan, step);
     for (const Form& form : forms()) {
-      EquationTree tree = with_terms(sample, grown, inputs, form);
+      EquationTree tree = with_terms(sample, form.splits ? grown : std::vector<Node>(1), inputs, form);
       step.trees.push_back(judge(tree));
-      importance = importance_of(tree);
+      if (form.splits) importance = importance_of(tree);
       work.did(share_of_tree * work.left());
     }
     if (count == 1) return steps;

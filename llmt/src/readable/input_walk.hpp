@@ -19,6 +19,7 @@ struct TreePlan {
 struct Form {
   bool products = false;  ///< with products and squares of inputs
   double coarseness = 1.0;
+  bool splits = true;  ///< else one rule: sparse least squares
 };
 
 /// The forms that are compared, the simplest first.

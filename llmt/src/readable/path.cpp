@@ -28,6 +28,16 @@ double error_without(const std::vector<double>& squares, const std::vector<doubl
   return std::sqrt(sum / weight);
 }
 
+// The size by which a tree is called short: its own, or that which half of the trees of its key have where that is
+// larger. A tree that is by chance shorter than those whose errors are known is not what they say.
+Eigen::Index size_for_choice(const ComparedTree& tree, const TreeExtent& own) {
+  std::vector<Eigen::Index> sizes;
+  for (const TreeExtent& extent : tree.extents) sizes.push_back(extent.size);
+  const auto middle = sizes.begin() + std::ssize(sizes) / 2;
+  std::ranges::nth_element(sizes, middle);
+  return std::max(own.size, *middle);
+}
+
 // The trees of one number of rules.
 struct Group {
   std::vector<std::size_t> trees;
@@ -46,11 +56,13 @@ Path path_of(const std::vector<ComparedTree>& trees, const PathRule& rule, int l
     return left_out < 0 ? trees[i].extents.back() : trees[i].extents[left_out];
   };
   std::vector<double> errors;
+  std::vector<Eigen::Index> sizes;
   std::map<Eigen::Index, Group> groups;
   double equation = infinity;  // the best single one without products
   Path path{.steps = {}, .chosen = 0, .yardstick = infinity, .is_within_loss = true, .rules = {}};
   for (std::size_t i = 0; i < trees.size(); ++i) {
     const double error = errors.emplace_back(error_without(trees[i].squares, rule.weights, left_out));
+    sizes.push_back(size_for_choice(trees[i], extent_of(i)));
     Group& group = groups[extent_of(i).rules];
     group.trees.push_back(i);
     group.smallest = std::min(group.smallest, error);
@@ -62,7 +74,7 @@ Path path_of(const std::vector<ComparedTree>& trees, const PathRule& rule, int l
   for (const std::vector<double>& squares : rule.crisp_squares)
     path.yardstick = std::min(path.yardstick, error_without(squares, rule.weights, left_out));
   const auto shortest = [&](const std::vector<std::size_t>& among, const auto& is_good) {
-    const auto rank = [&](std::size_t i) { return std::tuple(extent_of(i).size, trees[i].key.form, errors[i]); };
+    const auto rank = [&](std::size_t i) { return std::tuple(sizes[i], trees[i].key.form, errors[i]); };
     std::size_t best = trees.size();
     for (const std::size_t i : among) {
       if (is_good(i) && (best == trees.size() || rank(i) < rank(best))) best = i;

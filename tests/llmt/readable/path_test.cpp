@@ -12,12 +12,12 @@
 
 namespace {
 
-struct Data {
+struct Waves {
   Eigen::MatrixXd inputs;
   Eigen::MatrixXd outputs;
 };
 
-llmt::FitOptions crisp() {
+llmt::FitOptions crisp_trees() {
   llmt::FitOptions options;
   options.validity = llmt::ValidityChoice::crisp;
   return options;
@@ -78,9 +78,9 @@ TEST(Path, AFoldDoesNotChooseTheTreeThatItJudges) {
 }
 
 // Waves in x1, so that every rule more pays, and a line in x2.
-Data waves(Eigen::Index rows, std::uint64_t seed = 3) {
+Waves waves(Eigen::Index rows, std::uint64_t seed = 3) {
   llmt::Random random(seed);
-  Data data{Eigen::MatrixXd(rows, 2), Eigen::MatrixXd(rows, 1)};
+  Waves data{Eigen::MatrixXd(rows, 2), Eigen::MatrixXd(rows, 1)};
   for (Eigen::Index i = 0; i < rows; ++i) {
     data.inputs.row(i) << random.uniform(0.0, 6.0), random.uniform(-1.0, 1.0);
     data.outputs(i, 0) = 3.0 * std::sin(1.5 * data.inputs(i, 0)) + data.inputs(i, 1) + 0.2 * random.normal();
@@ -89,8 +89,8 @@ Data waves(Eigen::Index rows, std::uint64_t seed = 3) {
 }
 
 TEST(Readable, AStepIsTakenByItsRulesAndSaysWhatItCostsOnNewRows) {
-  const Data data = waves(500);
-  const llmt::PreparedFit prepared({data.inputs, data.outputs}, crisp());
+  const Waves data = waves(500);
+  const llmt::PreparedFit prepared({data.inputs, data.outputs}, crisp_trees());
   const llmt::FitSummary fitted = llmt::fit(prepared).summary;
   const llmt::ReadableResult usual = llmt::fit_readable(prepared, fitted);
   const std::vector<llmt::ReadableStep>& path = usual.partitions[0].path;
@@ -98,7 +98,7 @@ TEST(Readable, AStepIsTakenByItsRulesAndSaysWhatItCostsOnNewRows) {
   for (std::size_t k = 1; k < path.size(); ++k) EXPECT_GT(path[k].leaves, path[k - 1].leaves);
   EXPECT_EQ(path[usual.partitions[0].taken].leaves, usual.partitions[0].leaves);
   EXPECT_EQ(path[usual.partitions[0].taken].size, usual.partitions[0].size);
-  const Data fresh = waves(4000, 4);
+  const Waves fresh = waves(4000, 4);
   for (const llmt::ReadableStep& step : path) {
     if (step.leaves > 8) break;
     const llmt::ReadableResult taken = llmt::fit_readable(prepared, fitted, {.rules = step.leaves});
@@ -114,16 +114,16 @@ TEST(Readable, AStepIsTakenByItsRulesAndSaysWhatItCostsOnNewRows) {
 TEST(Readable, IsNoWorseThanSparseLeastSquaresWhateverTheLoss) {
   llmt::Random random(6);
   const auto draw = [&](Eigen::Index rows) {
-    Data data{Eigen::MatrixXd(rows, 8), Eigen::MatrixXd(rows, 1)};
+    Waves data{Eigen::MatrixXd(rows, 8), Eigen::MatrixXd(rows, 1)};
     for (Eigen::Index i = 0; i < rows; ++i) {
       for (Eigen::Index j = 0; j < 8; ++j) data.inputs(i, j) = random.normal();
       data.outputs(i, 0) = data.inputs.row(i).sum() + 0.5 * random.normal();
     }
     return data;
   };
-  const Data data = draw(300);
-  const Data fresh = draw(3000);
-  const llmt::PreparedFit prepared({data.inputs, data.outputs}, crisp());
+  const Waves data = draw(300);
+  const Waves fresh = draw(3000);
+  const llmt::PreparedFit prepared({data.inputs, data.outputs}, crisp_trees());
   const llmt::ReadableResult result = llmt::fit_readable(prepared, llmt::fit(prepared).summary, {.loss = 2.0});
   EXPECT_EQ(result.partitions[0].leaves, 1);
   EXPECT_EQ(result.partitions[0].most_terms, 8);
@@ -133,12 +133,12 @@ TEST(Readable, IsNoWorseThanSparseLeastSquaresWhateverTheLoss) {
 
 TEST(Readable, NoProductStandsWithoutItsMainTerms) {
   llmt::Random random(12);
-  Data data{Eigen::MatrixXd(500, 3), Eigen::MatrixXd(500, 1)};
+  Waves data{Eigen::MatrixXd(500, 3), Eigen::MatrixXd(500, 1)};
   for (Eigen::Index i = 0; i < 500; ++i) {
     data.inputs.row(i) << random.uniform(-1.0, 1.0), random.uniform(4.0, 6.0), random.uniform(-1.0, 1.0);
     data.outputs(i, 0) = 3.0 * data.inputs(i, 0) * (data.inputs(i, 1) - 5.0) + 0.05 * random.normal();
   }
-  const llmt::PreparedFit prepared({data.inputs, data.outputs}, crisp());
+  const llmt::PreparedFit prepared({data.inputs, data.outputs}, crisp_trees());
   const llmt::Model model = llmt::fit_readable(prepared, llmt::fit(prepared).summary).model;
   int products = 0;
   for (const llmt::Leaf& leaf : model.leaves(0)) {
@@ -162,7 +162,7 @@ TEST(Readable, NoProductStandsWithoutItsMainTerms) {
 TEST(Readable, KeepsTrendsInSlopesAndAtThresholds) {
   // Rises in the first input but for a dip that noise and a second regime invite; a category shifts all.
   llmt::Random random(15);
-  Data data{Eigen::MatrixXd(600, 3), Eigen::MatrixXd(600, 1)};
+  Waves data{Eigen::MatrixXd(600, 3), Eigen::MatrixXd(600, 1)};
   for (Eigen::Index i = 0; i < 600; ++i) {
     const double x = random.uniform(0.0, 10.0);
     const double z = random.uniform(-1.0, 1.0);
@@ -188,14 +188,14 @@ TEST(Readable, KeepsTrendsInSlopesAndAtThresholds) {
     }
     return fall;
   };
-  llmt::FitOptions free = crisp();
-  llmt::FitOptions rising = crisp();
+  llmt::FitOptions free = crisp_trees();
+  llmt::FitOptions rising = crisp_trees();
   rising.trends = {llmt::Trend::rising, llmt::Trend::any, llmt::Trend::any};
   for (const double loss : {0.0, 0.15}) {
     EXPECT_GT(largest_fall(free, loss), 0.5) << loss;
     EXPECT_LE(largest_fall(rising, loss), 1e-12) << loss;
   }
-  llmt::FitOptions slopes = crisp();
+  llmt::FitOptions slopes = crisp_trees();
   slopes.trends = {llmt::Trend::any, llmt::Trend::rising_slopes, llmt::Trend::any};
   const llmt::PreparedFit prepared(rows, slopes);
   for (const llmt::Leaf& leaf : llmt::fit_readable(prepared, llmt::fit(prepared).summary).model.leaves(0))
