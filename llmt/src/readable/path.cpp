@@ -46,9 +46,12 @@ struct Group {
 
 }  // namespace
 
-std::size_t Path::with_rules(Eigen::Index most) const {
-  const auto behind = std::ranges::upper_bound(rules, most);
-  return behind == rules.begin() ? 0 : static_cast<std::size_t>(behind - rules.begin()) - 1;
+std::size_t Path::with_rules(Eigen::Index most, bool paying) const {
+  std::size_t found = 0;
+  for (std::size_t step = 0; step < steps.size() && rules[step] <= most; ++step) {
+    if (pays[step] || !paying) found = step;
+  }
+  return found;
 }
 
 Path path_of(const std::vector<ComparedTree>& trees, const PathRule& rule, int left_out) {
@@ -59,7 +62,7 @@ Path path_of(const std::vector<ComparedTree>& trees, const PathRule& rule, int l
   std::vector<Eigen::Index> sizes;
   std::map<Eigen::Index, Group> groups;
   double equation = infinity;  // the best single one without products
-  Path path{.steps = {}, .chosen = 0, .yardstick = infinity, .is_within_loss = true, .rules = {}};
+  Path path{.steps = {}, .rules = {}, .pays = {}, .chosen = 0, .yardstick = infinity, .is_within_loss = true};
   for (std::size_t i = 0; i < trees.size(); ++i) {
     const double error = errors.emplace_back(error_without(trees[i].squares, rule.weights, left_out));
     sizes.push_back(size_for_choice(trees[i], extent_of(i)));
@@ -100,11 +103,11 @@ Path path_of(const std::vector<ComparedTree>& trees, const PathRule& rule, int l
     const double most = std::max((1.0 + tolerance_of_step) * group.smallest, rule.least);
     const std::size_t step =
         is_chosen ? chosen : shortest(group.trees, [&](std::size_t i) { return errors[i] <= most; });
-    if (!is_chosen && !(errors[step] < (1.0 - least_gain_of_step) * smallest)) continue;
-    smallest = std::min(smallest, errors[step]);
     if (is_chosen) path.chosen = path.steps.size();
     path.steps.push_back(step);
     path.rules.push_back(rules);
+    path.pays.push_back(is_chosen || errors[step] < (1.0 - least_gain_of_step) * smallest);
+    smallest = std::min(smallest, errors[step]);
   }
   return path;
 }

@@ -27,14 +27,15 @@ struct PathRule {
 
 /// Positions in the list of trees.
 struct Path {
-  std::vector<std::size_t> steps;  ///< ascending in rules, each with a smaller error than those before it
-  std::size_t chosen = 0;          ///< position in steps: what is taken where nobody asks for another
+  std::vector<std::size_t> steps;   ///< one for each number of rules, ascending
+  std::vector<Eigen::Index> rules;  ///< of each step
+  std::vector<bool> pays;           ///< whether its error is 1 % below those of all steps with fewer rules
+  std::size_t chosen = 0;           ///< position in steps: what is taken where nobody asks for another
   double yardstick = 0.0;          ///< smallest error of the crisp trees of the fit and of the trees without products
   bool is_within_loss = true;      ///< the error of the chosen one is at most (1 + loss) yardstick
 
-  /// The step with the most rules that are at most this many; the first if all have more.
-  std::size_t with_rules(Eigen::Index rules) const;
-  std::vector<Eigen::Index> rules;  ///< of each step
+  /// The step with the most rules that are at most this many; the first if all have more. `paying`: of those that pay.
+  std::size_t with_rules(Eigen::Index most, bool paying) const;
 };
 
 /// The path as a choice finds it that knows the errors on all folds but `left_out` and the length of that fold's trees;

@@ -122,15 +122,18 @@ Choice choose(const Setting& setting, const std::vector<std::vector<WalkStep>>& 
   std::vector<Path> of_others;
   for (int f = 0; f < folds; ++f) of_others.push_back(folds > 1 ? path_of(trees, rule, f) : path);
   const auto step_of = [&](const Path& other, std::size_t step) {
-    return other.steps[step == path.chosen ? other.chosen : other.with_rules(path.rules[step])];
+    return other.steps[step == path.chosen ? other.chosen : other.with_rules(path.rules[step], false)];
   };
   const FoldErrors error_of_folds(setting.folds, std::ssize(partition.outputs));
   Choice choice{.steps = {},
-                .taken = options.rules > 0 ? path.with_rules(options.rules) : path.chosen,
+                .taken = 0,
                 .yardstick = path.yardstick,
                 .is_within_loss = path.is_within_loss,
                 .keys = {}};
+  const std::size_t taken = options.rules > 0 ? path.with_rules(options.rules, true) : path.chosen;
   for (std::size_t step = 0; step < path.steps.size(); ++step) {
+    if (!path.pays[step]) continue;
+    if (step == taken) choice.taken = choice.steps.size();
     std::vector<double> squares;
     for (int f = 0; f < folds; ++f) squares.push_back(trees[step_of(of_others[f], step)].squares[f]);
     const CandidateError error = error_of_folds({}, squares);
@@ -138,8 +141,8 @@ Choice choose(const Setting& setting, const std::vector<std::vector<WalkStep>>& 
     choice.steps.push_back(
         {extent.rules, extent.most_terms, extent.size, error.rmse, error.spread, error.fold_rmse});
   }
-  for (int f = 0; f < folds; ++f) choice.keys.push_back(trees[step_of(of_others[f], choice.taken)].key);
-  choice.keys.push_back(trees[path.steps[choice.taken]].key);
+  for (int f = 0; f < folds; ++f) choice.keys.push_back(trees[step_of(of_others[f], taken)].key);
+  choice.keys.push_back(trees[path.steps[taken]].key);
   return choice;
 }
 

@@ -38,13 +38,15 @@ TEST(Path, TakesTheSmallestWithinTheLossAndTheShortestOfEveryNumberOfRules) {
   const llmt::PathRule rule{.loss = 0.2, .least = 0.0, .weights = {1.0, 1.0}, .crisp_squares = {}};
   const llmt::Path path = llmt::path_of(trees, rule, -1);
   // 1.2 x 0.99 lets 1.1 pass, not 1.2; of one rule and of four the shorter is within 2 %; three rules do not pay.
-  EXPECT_EQ(path.steps, (std::vector<std::size_t>{1, 4, 6}));
-  EXPECT_EQ(path.rules, (std::vector<Eigen::Index>{1, 2, 4}));
+  EXPECT_EQ(path.steps, (std::vector<std::size_t>{1, 4, 5, 6}));
+  EXPECT_EQ(path.rules, (std::vector<Eigen::Index>{1, 2, 3, 4}));
+  EXPECT_EQ(path.pays, (std::vector<bool>{true, true, false, true}));
   EXPECT_EQ(path.chosen, 1u);
   EXPECT_EQ(path.yardstick, 0.99);
   EXPECT_TRUE(path.is_within_loss);
-  EXPECT_EQ(path.with_rules(3), 1u);
-  EXPECT_EQ(path.with_rules(400), 2u);
+  EXPECT_EQ(path.with_rules(3, true), 1u);
+  EXPECT_EQ(path.with_rules(3, false), 2u);
+  EXPECT_EQ(path.with_rules(400, true), 3u);
 }
 
 TEST(Path, ATreeIsNoWorseThanTheBestSingleEquation) {
