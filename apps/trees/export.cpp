@@ -44,8 +44,8 @@ void export_plain(const ExportArguments& arguments) {
     throw std::runtime_error(arguments.model + ": --plain is for readable trees; `llmt fit --readable` writes one");
   }
   const Model model = load_model(arguments.model);
-  const auto language = std::ranges::find(plain_languages, arguments.plain,
-                                          &std::pair<std::string_view, report::PlainLanguage>::first);
+  const auto language =
+      std::ranges::find(plain_languages, arguments.plain, &std::pair<std::string_view, report::PlainLanguage>::first);
   write_file(arguments.output,
              report::plain_source(model, language->second, arguments.name, without_controls(arguments.model)));
   print(fmt::format("{}: {} inputs, {} outputs; written to {}\n", arguments.model, model.num_inputs(),
@@ -101,8 +101,10 @@ void add_export(CLI::App& app) {
   command->add_option("--plain", arguments->plain, "A readable tree as plain if and equations in this language")
       ->type_name("c|python|sql")
       ->check(CLI::IsMember(languages));
-  command->add_option("--name", arguments->name, "Begins all names in the source; of --plain sql the table")->capture_default_str();
-  add_output_file(*command, "-o,--output", arguments->output, "File to write; of --c FILE.h is written beside it", {".h"})
+  command->add_option("--name", arguments->name, "Begins all names in the source; of --plain sql the table")
+      ->capture_default_str();
+  add_output_file(*command, "-o,--output", arguments->output, "File to write; of --c FILE.h is written beside it",
+                  {".h"})
       ->required();
   command->callback([arguments] { export_command(*arguments); });
 }

@@ -213,8 +213,7 @@ void add_fit(CLI::App& app) {
                  "per cent above that of the best crisp tree [15]; written beside the model as NAME.readable.json")
       ->option_text("[=LOSS]");
   add_count(*command, "--readable-rules", arguments->readable_rules, Eigen::Index{1},
-            "As --readable, but of its trees the one with the most rules up to this number",
-            Eigen::Index{1000});
+            "As --readable, but of its trees the one with the most rules up to this number", Eigen::Index{1000});
   command->add_flag("--teach", arguments->teach,
                     "Fit the tree to the answers of a sum of trees (--boost), on the rows and on rows made of them; "
                     "taken if its held-out error is smaller. Takes several times as long");

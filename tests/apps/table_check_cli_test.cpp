@@ -106,6 +106,10 @@ TEST(TableCheckProgram, WhatCannotBeJudgedHasACodeOfItsOwn) {
   const Outcome empty = folder.run(llmt_program + " check m.json empty.csv");
   EXPECT_EQ(empty.exit_code, 4);
   EXPECT_NE(empty.err.find("empty.csv: there is a header and no rows"), std::string::npos) << empty.err;
+  folder.write("nothing.csv", "");
+  const Outcome nothing = folder.run(llmt_program + " check m.json nothing.csv");
+  EXPECT_EQ(nothing.exit_code, 4);
+  EXPECT_NE(nothing.err.find("nothing.csv: the file is empty, a header row is needed"), std::string::npos);
   const Outcome json_of = folder.run(llmt_program + " check m.json inputs.csv --json");
   EXPECT_EQ(json_of.exit_code, 4);
   EXPECT_EQ(json::parse(json_of.out)["targets"][0]["rmse"], nullptr);

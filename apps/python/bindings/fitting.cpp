@@ -259,8 +259,8 @@ void add_fitting(nb::module_& module) {
   module.def("fit", &fit_table, nb::arg("inputs"), nb::arg("outputs"), nb::arg("options"), nb::kw_only(),
              nb::arg("input_names"), nb::arg("output_names"), nb::arg("levels"), nb::arg("weights") = nb::none(),
              nb::arg("groups") = nb::none(), nb::arg("held_out") = std::vector<Eigen::Index>(),
-             nb::arg("may_have_codes") = true, nb::arg("readable_loss") = nb::none(), nb::arg("readable_rules") = 0, nb::arg("teach") = false,
-             nb::arg("report") = nb::none());
+             nb::arg("may_have_codes") = true, nb::arg("readable_loss") = nb::none(), nb::arg("readable_rules") = 0,
+             nb::arg("teach") = false, nb::arg("report") = nb::none());
   module.def("accidental_inputs", &accidental, nb::arg("inputs"), nb::arg("levels"));
   module.def("dominant_rows", &dominant, nb::arg("output"));
   add_stream(module);

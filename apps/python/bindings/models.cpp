@@ -129,7 +129,8 @@ auto permutation_importance_of(const ModelWithIntervals& self, const Array& inpu
                                        options, progress);
       },
       nb::none());
-  return std::make_tuple(array_of<double>(std::move(found.increase)), array_of<double>(std::move(found.standard_error)));
+  return std::make_tuple(array_of<double>(std::move(found.increase)),
+                         array_of<double>(std::move(found.standard_error)));
 }
 
 std::tuple<std::string, std::string> c_source(const ModelWithIntervals& self, const std::string& name) {
@@ -165,9 +166,11 @@ void add_models(nb::module_& module) {
           [](const Self& self, const Array& inputs, const Array& outputs, const std::optional<Vector>& weights,
              int repeats, std::uint64_t seed, int threads) {
             const auto rows = static_cast<Eigen::Index>(inputs.shape(0));
-            return permutation_importance_of(
-                self, inputs, outputs, weights,
-                {.repeats = repeats, .most_rows = std::max(rows, Eigen::Index{10}), .seed = seed, .max_threads = threads});
+            return permutation_importance_of(self, inputs, outputs, weights,
+                                             {.repeats = repeats,
+                                              .most_rows = std::max(rows, Eigen::Index{10}),
+                                              .seed = seed,
+                                              .max_threads = threads});
           },
           nb::arg("inputs"), nb::arg("outputs"), nb::arg("weights").none(), nb::arg("repeats"), nb::arg("seed"),
           nb::arg("threads") = 0)
@@ -182,14 +185,15 @@ void add_models(nb::module_& module) {
           nb::arg("inputs"), nb::arg("outputs"), nb::arg("words"), nb::arg("level"), nb::arg("limits"),
           nb::arg("weights").none(), nb::arg("threads") = 0)
       .def("to_c", &c_source, nb::arg("name"))
-      .def("plain_source",
-           [](const Self& self, const std::string& language, const std::string& name) {
-             const auto as = language == "c"        ? report::PlainLanguage::c
-                             : language == "python" ? report::PlainLanguage::python
-                                                    : report::PlainLanguage::sql;
-             return report::plain_source(self.model, as, name, "model");
-           },
-           nb::arg("language"), nb::arg("name"))
+      .def(
+          "plain_source",
+          [](const Self& self, const std::string& language, const std::string& name) {
+            const auto as = language == "c"        ? report::PlainLanguage::c
+                            : language == "python" ? report::PlainLanguage::python
+                                                   : report::PlainLanguage::sql;
+            return report::plain_source(self.model, as, name, "model");
+          },
+          nb::arg("language"), nb::arg("name"))
       .def("leaves_json", [](const Self& self) { return report::leaves_json(self.model).dump(); })
       .def("leaves_text", [](const Self& self, const std::string& name,
                              std::size_t width) { return report::leaves_text(self.model, name, width); })

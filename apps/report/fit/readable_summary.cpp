@@ -48,20 +48,21 @@ double smallest_crisp(const PartitionSummary& full) {
 std::string note_on(const ReadablePartition& simple, const PartitionSummary& full, const std::string& of,
                     const ReadableOptions& asked) {
   if (asked.rules > 0) {
-    const std::string none =
-        simple.leaves == asked.rules ? "" : fmt::format("; no step has {}, or those that have pay with nothing", asked.rules);
+    const std::string none = simple.leaves == asked.rules
+                                 ? ""
+                                 : fmt::format("; no step has {}, or those that have pay with nothing", asked.rules);
     return fmt::format("The readable tree{} is the step with at most {} rule{}, as asked{}.", of, asked.rules,
                        asked.rules == 1 ? "" : "s", none);
   }
   const std::string best = number(simple.yardstick);
-  const std::string whose = simple.yardstick < smallest_crisp(full) ? "the smallest error of such trees"
-                                                                    : "the error of the best crisp tree";
+  const std::string whose =
+      simple.yardstick < smallest_crisp(full) ? "the smallest error of such trees" : "the error of the best crisp tree";
   if (simple.is_within_loss) {
     return fmt::format("When it was chosen the readable tree{} was the smallest one at most {:g} % above {}, {}.", of,
                        100.0 * asked.loss, best, whose);
   }
-  return fmt::format("No short tree{} came within {:g} % of {}, {}; this one came nearest.", of, 100.0 * asked.loss, best,
-                     whose);
+  return fmt::format("No short tree{} came within {:g} % of {}, {}; this one came nearest.", of, 100.0 * asked.loss,
+                     best, whose);
 }
 
 double per_cent_above(double rmse, double of_model) { return 100.0 * (rmse / of_model - 1.0); }
@@ -139,8 +140,8 @@ Grid steps_grid(const FitResult& fitted, const ReadableResult& readable) {
     for (const std::size_t k : shown_steps(simple)) {
       const ReadableStep& step = simple.path[k];
       const std::string above = chosen > 0.0 ? fmt::format("{:.0f} %", per_cent_above(step.rmse, chosen)) : "";
-      grid.rows.push_back({name, count(step.leaves), count(step.most_terms), count(step.size), number(step.rmse),
-                           above, k == simple.taken ? "taken" : ""});
+      grid.rows.push_back({name, count(step.leaves), count(step.most_terms), count(step.size), number(step.rmse), above,
+                           k == simple.taken ? "taken" : ""});
       name.clear();
     }
   }

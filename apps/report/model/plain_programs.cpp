@@ -112,11 +112,11 @@ static int {}_is(const char *text, const char *level) {{ return strcmp(text == N
     std::vector<std::string> parameters;
     for (const PlainArgument& argument : arguments)
       parameters.push_back((argument.is_text ? "const char *" : "double ") + argument.name);
-    std::string text = fmt::format("\n/* {} */\ndouble {}_{}({}) {{\n", in_comment(target), name_, plain_letters(target),
-                                   parameters.empty() ? "void" : fmt::format("{}", fmt::join(parameters, ", ")));
+    std::string text =
+        fmt::format("\n/* {} */\ndouble {}_{}({}) {{\n", in_comment(target), name_, plain_letters(target),
+                    parameters.empty() ? "void" : fmt::format("{}", fmt::join(parameters, ", ")));
     for (const PlainDefinition& each : definitions) {
-      const bool is_argument =
-          std::ranges::find(arguments, each.name, &PlainArgument::name) != arguments.end();
+      const bool is_argument = std::ranges::find(arguments, each.name, &PlainArgument::name) != arguments.end();
       text += fmt::format("  {}{} = {};\n", is_argument ? "" : "double ", each.name, each.expression);
     }
     return text + rules + "}\n";
@@ -129,9 +129,10 @@ class PythonWords : public Program {
 
   std::string identifier(const std::string& wish) const override {
     static const std::set<std::string> words = {
-        "False", "None",  "True", "and",    "as",   "assert", "async",    "await",  "break", "class", "continue", "def",
-        "del",   "elif",  "else", "except", "for",  "from",   "finally",  "global", "if",    "import", "in",      "is",
-        "lambda", "nonlocal", "not", "or",  "pass", "raise",  "return",   "try",    "while", "with",  "yield",    "float"};
+        "False",   "None",     "True",  "and",    "as",   "assert", "async",  "await",    "break",
+        "class",   "continue", "def",   "del",    "elif", "else",   "except", "for",      "from",
+        "finally", "global",   "if",    "import", "in",   "is",     "lambda", "nonlocal", "not",
+        "or",      "pass",     "raise", "return", "try",  "while",  "with",   "yield",    "float"};
     const std::string text = plain_letters(wish);
     return words.contains(text) || text.starts_with("_") ? "x" + text : text;
   }

@@ -53,7 +53,8 @@ class Writer {
       if (!used[j]) continue;
       const std::string& name = model_.inputs()[j].name;
       made.argument[j] = words_.column(name).empty() ? unused(name) : words_.column(name);
-      made.arguments.push_back({made.argument[j], name, model_.inputs()[j].is_categorical() && model_.inputs()[j].codes.empty()});
+      made.arguments.push_back(
+          {made.argument[j], name, model_.inputs()[j].is_categorical() && model_.inputs()[j].codes.empty()});
     }
     for (std::size_t j = 0; j < used.size(); ++j) {
       if (!used[j]) continue;
@@ -79,20 +80,18 @@ class Writer {
         made.regressor[k] = define(input.name + "_is_" + input.shown_level(regressor.level), indicator(x, regressor));
       } else if (regressor.second_input < 0) {
         made.regressor[k] = define(input.name + "_held", is_held ? words_.held(x, input.low, input.high, input.centre)
-                                                        : words_.or_mean(x, input.centre));
+                                                                 : words_.or_mean(x, input.centre));
       } else {
         for (const int j : {regressor.input, regressor.second_input}) {
           const InputColumn& factor = model_.inputs()[j];
           if (!factors[j].empty()) continue;
-          const std::string held =
-              words_.held(made.argument[j], factor.low, factor.high, factor.centre);
+          const std::string held = words_.held(made.argument[j], factor.low, factor.high, factor.centre);
           factors[j] = define(factor.name + "_off", held + signed_text(-factor.centre));
         }
         const std::string product = factors[regressor.input] + " * " + factors[regressor.second_input];
         const Node& root = partition.nodes.front();
-        made.regressor[k] =
-            define(input.name + "_x_" + model_.inputs()[regressor.second_input].name,
-                   is_held ? words_.held(product, root.low(k), root.high(k), 0.0) : product);
+        made.regressor[k] = define(input.name + "_x_" + model_.inputs()[regressor.second_input].name,
+                                   is_held ? words_.held(product, root.low(k), root.high(k), 0.0) : product);
       }
     }
     return made;

@@ -32,7 +32,8 @@ class SqlWords : public PlainWords {
       return fmt::format("({0}) - {1} * ({0}) * ({0})", beyond, per);
     };
     return fmt::format(
-        "CASE WHEN {0} IS NULL THEN {1} WHEN {0} >= {2} THEN {3} WHEN {0} > {4} THEN {4} + {5} WHEN {0} <= {6} THEN {7} "
+        "CASE WHEN {0} IS NULL THEN {1} WHEN {0} >= {2} THEN {3} WHEN {0} > {4} THEN {4} + {5} WHEN {0} <= {6} THEN "
+        "{7} "
         "WHEN {0} < {8} THEN {8} - ({9}) ELSE {0} END",
         x, literal(mean), literal(high + round), literal(high + 0.5 * round), literal(high),
         square(fmt::format("{} - ({})", x, literal(high))), literal(low - round), literal(low - 0.5 * round),
@@ -57,10 +58,10 @@ class SqlWords : public PlainWords {
         named.push_back(literal(input.codes[level]));
       }
     }
-    const std::string is_one =
-        named.empty() ? "1 = 0"
-                      : fmt::format("{}{} IN ({})", input.codes.empty() ? "" : x + " IS NOT NULL AND ", x,
-                                    fmt::join(named, ", "));
+    const std::string is_one = named.empty()
+                                   ? "1 = 0"
+                                   : fmt::format("{}{} IN ({})", input.codes.empty() ? "" : x + " IS NOT NULL AND ", x,
+                                                 fmt::join(named, ", "));
     return with_missing ? fmt::format("({} OR {} IS NULL)", is_one, x) : is_one;
   }
   std::string is_known(const std::string& x) const override { return x + " IS NOT NULL"; }
@@ -84,8 +85,8 @@ class SqlWords : public PlainWords {
   std::string function(const std::string& target, bool is_last, const std::vector<PlainArgument>&,
                        const std::vector<PlainDefinition>& definitions, const std::string& rules) override {
     const auto with = [&](const std::string& name, const std::string& expression) {
-      steps_.push_back(fmt::format("llmt_step_{} AS (SELECT *, {} AS {} FROM {})", steps_.size() + 1, expression, name,
-                                   from_));
+      steps_.push_back(
+          fmt::format("llmt_step_{} AS (SELECT *, {} AS {} FROM {})", steps_.size() + 1, expression, name, from_));
       from_ = fmt::format("llmt_step_{}", steps_.size());
     };
     for (const PlainDefinition& each : definitions) {

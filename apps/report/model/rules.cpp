@@ -87,7 +87,8 @@ std::string with_named_sets(const Model& model, const Partition& partition, cons
   };
   for (const Leaf& leaf : leaves) {
     for (std::size_t j = 0; j < leaf.levels.size(); ++j) {
-      if (!leaf.levels[j].empty()) offer(levels_text(model.inputs()[j], leaf.levels[j]).substr(model.inputs()[j].name.size()));
+      if (!leaf.levels[j].empty())
+        offer(levels_text(model.inputs()[j], leaf.levels[j]).substr(model.inputs()[j].name.size()));
     }
   }
   for (const Node& node : partition.nodes) {

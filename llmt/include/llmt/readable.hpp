@@ -71,11 +71,11 @@ struct ReadableResult {
 /// docs/algorithms/readable.md has the equations.
 ///
 /// `prepared`: what the fit was made from; `fitted`: the fit's summary. Of the options the tree uses columns, weights,
-/// folds, shared_partition, max_leaves, min_leaf_samples, trends, expert.search and max_threads; with LocalTerms::quadratic or
-/// automatic equations may have products of two inputs.
+/// folds, shared_partition, max_leaves, min_leaf_samples, trends, expert.search and max_threads; with
+/// LocalTerms::quadratic or automatic equations may have products of two inputs.
 ///
-/// Throws std::invalid_argument if the loss is negative or not finite, if rules is negative, if nothing was held out in the fit, and with the
-/// words of why_not_readable() if there are any.
+/// Throws std::invalid_argument if the loss is negative or not finite, if rules is negative, if nothing was held out in
+/// the fit, and with the words of why_not_readable() if there are any.
 ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitted, const ReadableOptions& asked = {},
                             const Progress& progress = {});
 

@@ -26,9 +26,9 @@ class EquationTree {
   /// `sample` must live as long as the tree.
   EquationTree(const Sample& sample, std::vector<Node> grown, std::vector<Term> terms, double coarseness);
 
-  /// The cheapest tree at a price for one symbol, in mean square error: see cheapest_tree(). Where trends are asked for,
-  /// slopes have their signs, and of a monotone input a split at which a prediction steps against the trend is undone,
-  /// the lowest first.
+  /// The cheapest tree at a price for one symbol, in mean square error: see cheapest_tree(). Where trends are asked
+  /// for, slopes have their signs, and of a monotone input a split at which a prediction steps against the trend is
+  /// undone, the lowest first.
   std::vector<int> pruned(double price);
 
   /// The price of a symbol at which a term pays if it lowers the sum of squares by ln N times the variance that the

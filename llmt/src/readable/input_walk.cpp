@@ -67,8 +67,8 @@ EquationTree with_terms(const Sample& sample, std::vector<Node> grown, const std
                         const Form& form) {
   const std::vector<int> of_terms = common(sample.described.table->regression_inputs, inputs);
   // A product has the slope of one factor depend on the other: no trend is kept so.
-  const bool products = form.products && std::ssize(of_terms) <= most_inputs_of_products &&
-                        sample.described.table->slope_signs.empty();
+  const bool products =
+      form.products && std::ssize(of_terms) <= most_inputs_of_products && sample.described.table->slope_signs.empty();
   return {sample, std::move(grown), terms_of(sample, of_terms, products), form.coarseness};
 }
 

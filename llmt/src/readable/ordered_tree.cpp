@@ -23,7 +23,7 @@ struct Box {
 };
 
 std::vector<Box> node_boxes(const std::vector<Node>& nodes, const std::vector<int>& there, const std::vector<int>& tree,
-                          const std::vector<int>& num_levels) {
+                            const std::vector<int>& num_levels) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   const auto inputs = static_cast<Eigen::Index>(num_levels.size());
   std::vector<Box> boxes(nodes.size());

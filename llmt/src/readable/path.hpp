@@ -20,8 +20,8 @@ struct ComparedTree {
 /// What the trees of a path are measured by.
 struct PathRule {
   double loss = 0.0;
-  double least = 0.0;                             ///< errors below are rounding
-  std::vector<double> weights;                    ///< total weight of each fold's held-out rows
+  double least = 0.0;                              ///< errors below are rounding
+  std::vector<double> weights;                     ///< total weight of each fold's held-out rows
   std::vector<std::vector<double>> crisp_squares;  ///< as ComparedTree::squares, of each crisp tree of the fit
 };
 
@@ -31,8 +31,8 @@ struct Path {
   std::vector<Eigen::Index> rules;  ///< of each step
   std::vector<bool> pays;           ///< whether its error is 1 % below those of all steps with fewer rules
   std::size_t chosen = 0;           ///< position in steps: what is taken where nobody asks for another
-  double yardstick = 0.0;          ///< smallest error of the crisp trees of the fit and of the trees without products
-  bool is_within_loss = true;      ///< the error of the chosen one is at most (1 + loss) yardstick
+  double yardstick = 0.0;           ///< smallest error of the crisp trees of the fit and of the trees without products
+  bool is_within_loss = true;       ///< the error of the chosen one is at most (1 + loss) yardstick
 
   /// The step with the most rules that are at most this many; the first if all have more. `paying`: of those that pay.
   std::size_t with_rules(Eigen::Index most, bool paying) const;

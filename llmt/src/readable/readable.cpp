@@ -125,11 +125,8 @@ Choice choose(const Setting& setting, const std::vector<std::vector<WalkStep>>& 
     return other.steps[step == path.chosen ? other.chosen : other.with_rules(path.rules[step], false)];
   };
   const FoldErrors error_of_folds(setting.folds, std::ssize(partition.outputs));
-  Choice choice{.steps = {},
-                .taken = 0,
-                .yardstick = path.yardstick,
-                .is_within_loss = path.is_within_loss,
-                .keys = {}};
+  Choice choice{
+      .steps = {}, .taken = 0, .yardstick = path.yardstick, .is_within_loss = path.is_within_loss, .keys = {}};
   const std::size_t taken = options.rules > 0 ? path.with_rules(options.rules, true) : path.chosen;
   for (std::size_t step = 0; step < path.steps.size(); ++step) {
     if (!path.pays[step]) continue;
@@ -138,8 +135,7 @@ Choice choose(const Setting& setting, const std::vector<std::vector<WalkStep>>& 
     for (int f = 0; f < folds; ++f) squares.push_back(trees[step_of(of_others[f], step)].squares[f]);
     const CandidateError error = error_of_folds({}, squares);
     const TreeExtent& extent = trees[path.steps[step]].extents.back();
-    choice.steps.push_back(
-        {extent.rules, extent.most_terms, extent.size, error.rmse, error.spread, error.fold_rmse});
+    choice.steps.push_back({extent.rules, extent.most_terms, extent.size, error.rmse, error.spread, error.fold_rmse});
   }
   for (int f = 0; f < folds; ++f) choice.keys.push_back(trees[step_of(of_others[f], taken)].key);
   choice.keys.push_back(trees[path.steps[taken]].key);

@@ -67,4 +67,15 @@ TEST(Outliers, AValueThatHidesTheOthersIsSaidToDoSo) {
   EXPECT_EQ(llmt::dominant_rows(values).share, 1.0);
 }
 
+TEST(DominantRows, OfFewRowsNoneIsSaidToCarryMost) {
+  const auto dominant = [](Eigen::Index rows) {
+    Eigen::VectorXd values = Eigen::VectorXd::LinSpaced(rows, 0.0, 1.0);
+    values(1) = 100.0;
+    return llmt::dominant_rows(values).rows.size();
+  };
+  EXPECT_EQ(dominant(3), 0u);
+  EXPECT_EQ(dominant(9), 0u);
+  EXPECT_EQ(dominant(40), 1u);
+}
+
 }  // namespace
