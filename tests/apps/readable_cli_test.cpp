@@ -75,8 +75,8 @@ TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
   folder.write("d.csv", text_of(rows()));
   const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y -o m.json --readable --cv 3");
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
-  for (const char* text : {"readable", "least squares", "at most 15 % above", "m.readable.json",
-                           "The readable tree has a smaller held-out error than the model chosen above."}) {
+  for (const char* text :
+       {"readable", "least squares", "at most 15 % above", "m.readable.json", "Reading costs ", "-44 %"}) {
     EXPECT_NE(fitted.out.find(text), std::string::npos) << fitted.out;
   }
   // Held-out errors are those of rows that the fit has not seen, here by the printed rules and by least squares.
@@ -107,6 +107,10 @@ TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
   const Outcome without_file = folder.run(llmt_program + " fit d.csv -t y --readable=50 --validity crisp --cv 3");
   EXPECT_NE(without_file.out.find("at most 50 % above"), std::string::npos) << without_file.out;
   EXPECT_EQ(without_file.out.find("written to"), std::string::npos) << without_file.out;
+  const Outcome three = folder.run(llmt_program + " fit d.csv -t y --readable-rules 3 --cv 3");
+  EXPECT_NE(three.out.find("The readable tree has a smaller held-out error than the model chosen above."),
+            std::string::npos)
+      << three.out;
 }
 
 TEST(ReadableProgram, ThePriceIsSaidBesideTheChosenModel) {

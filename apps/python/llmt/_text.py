@@ -61,7 +61,7 @@ def _steps(path: list[dict[str, Any]], taken: int) -> list[str]:
     for k, step in enumerate(path):
         if step["leaves"] > _MOST_READ_RULES and k not in (taken, len(path) - 1):
             continue
-        above = "" if step["above_model"] is None else f"{100.0 * step['above_model']:.0f} %"
+        above = "" if step["above_model"] is None else f"{round(100.0 * step['above_model'])} %"
         line = f"  {step['leaves']:>5}  {step['most_terms']:>14}  {step['size']:>4}  {number(step['cv_rmse']):>13}  {above:>15}"
         lines.append(line.rstrip() + ("  taken" if k == taken else ""))
     return lines

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "llmt/size.hpp"
@@ -139,7 +140,9 @@ Grid steps_grid(const FitResult& fitted, const ReadableResult& readable) {
     std::string name = fitted.model.outputs()[simple.outputs.front()].name;
     for (const std::size_t k : shown_steps(simple)) {
       const ReadableStep& step = simple.path[k];
-      const std::string above = chosen > 0.0 ? fmt::format("{:.0f} %", per_cent_above(step.rmse, chosen)) : "";
+      // Adding 0 leaves no "-0".
+      const double per_cent = std::round(per_cent_above(step.rmse, chosen)) + 0.0;
+      const std::string above = chosen > 0.0 ? fmt::format("{:.0f} %", per_cent) : "";
       grid.rows.push_back({name, count(step.leaves), count(step.most_terms), count(step.size), number(step.rmse), above,
                            k == simple.taken ? "taken" : ""});
       name.clear();

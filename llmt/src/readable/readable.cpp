@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -33,6 +34,9 @@ namespace {
 
 // Held-out errors below this part of that of a constant are rounding.
 constexpr double rounding_error = 1e-8;
+
+// A tree that has more rules than another and not this much less error does not pay.
+constexpr double least_gain_of_step = 0.01;
 
 void check(const FitOptions& options, const FitSummary& fitted, const ReadableOptions& asked) {
   const auto refuse = [](const std::string& what) { throw std::invalid_argument("llmt::fit_readable: " + what); };
@@ -121,23 +125,30 @@ Choice choose(const Setting& setting, const std::vector<std::vector<WalkStep>>& 
   // choose. A single fold has no others, and many rows.
   std::vector<Path> of_others;
   for (int f = 0; f < folds; ++f) of_others.push_back(folds > 1 ? path_of(trees, rule, f) : path);
-  const auto step_of = [&](const Path& other, std::size_t step) {
-    return other.steps[step == path.chosen ? other.chosen : other.with_rules(path.rules[step], false)];
+  const auto tree_of = [&](std::size_t step, int f) {
+    const Path& other = of_others[f];
+    return other.steps[step == path.chosen ? other.chosen : other.with_rules(path.rules[step])];
   };
   const FoldErrors error_of_folds(setting.folds, std::ssize(partition.outputs));
   Choice choice{
       .steps = {}, .taken = 0, .yardstick = path.yardstick, .is_within_loss = path.is_within_loss, .keys = {}};
-  const std::size_t taken = options.rules > 0 ? path.with_rules(options.rules, true) : path.chosen;
+  double smallest = std::numeric_limits<double>::infinity();
+  std::size_t taken = path.chosen;
   for (std::size_t step = 0; step < path.steps.size(); ++step) {
-    if (!path.pays[step]) continue;
-    if (step == taken) choice.taken = choice.steps.size();
     std::vector<double> squares;
-    for (int f = 0; f < folds; ++f) squares.push_back(trees[step_of(of_others[f], step)].squares[f]);
+    for (int f = 0; f < folds; ++f) squares.push_back(trees[tree_of(step, f)].squares[f]);
     const CandidateError error = error_of_folds({}, squares);
+    if (step != path.chosen && !(error.rmse < (1.0 - least_gain_of_step) * smallest)) continue;
+    smallest = std::min(smallest, error.rmse);
+    const bool is_asked = choice.steps.empty() || path.rules[step] <= options.rules;
+    if (options.rules > 0 ? is_asked : step == path.chosen) {
+      taken = step;
+      choice.taken = choice.steps.size();
+    }
     const TreeExtent& extent = trees[path.steps[step]].extents.back();
     choice.steps.push_back({extent.rules, extent.most_terms, extent.size, error.rmse, error.spread, error.fold_rmse});
   }
-  for (int f = 0; f < folds; ++f) choice.keys.push_back(trees[step_of(of_others[f], taken)].key);
+  for (int f = 0; f < folds; ++f) choice.keys.push_back(trees[tree_of(taken, f)].key);
   choice.keys.push_back(trees[path.steps[taken]].key);
   return choice;
 }

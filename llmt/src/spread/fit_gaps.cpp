@@ -237,6 +237,12 @@ Gap gap_of(const Box& box, const Eigen::Ref<const Eigen::MatrixXd>& inputs, cons
   return gap;
 }
 
+// Many rows at the smallest value of a column have places above 0: a box below them lies beyond all values, and no row
+// ever falls into it.
+bool holds_values(const Gap& gap) {
+  return std::ranges::all_of(gap.sides, [](const GapSide& side) { return side.low < side.high; });
+}
+
 bool is_within(const Gap& inner, const Gap& outer) {
   return std::ranges::all_of(outer.sides, [&](const GapSide& side) {
     return std::ranges::any_of(inner.sides, [&](const GapSide& other) {
@@ -274,7 +280,7 @@ std::vector<Gap> fit_gaps(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const
     empty_of(box, places, rows, some.size(), -std::numeric_limits<double>::infinity());
     const Gap gap = gap_of(box, inputs, varying);
     const auto holds_it = [&](const Gap& other) { return is_within(gap, other); };
-    if (std::ranges::none_of(gaps, holds_it)) gaps.push_back(gap);
+    if (holds_values(gap) && std::ranges::none_of(gaps, holds_it)) gaps.push_back(gap);
   }
   return gaps;
 }

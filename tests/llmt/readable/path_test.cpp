@@ -3,7 +3,7 @@
 
 #include <Eigen/QR>
 #include <cmath>
-#include <numbers>
+#include <limits>
 
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
@@ -37,16 +37,14 @@ TEST(Path, TakesTheSmallestWithinTheLossAndTheShortestOfEveryNumberOfRules) {
                                                  compared(6, 4, 60, 1.0, 1.0),   compared(7, 4, 99, 0.99, 0.99)};
   const llmt::PathRule rule{.loss = 0.2, .least = 0.0, .weights = {1.0, 1.0}, .crisp_squares = {}};
   const llmt::Path path = llmt::path_of(trees, rule, -1);
-  // 1.2 x 0.99 lets 1.1 pass, not 1.2; of one rule and of four the shorter is within 2 %; three rules do not pay.
+  // 1.2 x 0.99 lets 1.1 pass, not 1.2; of one rule and of four the shorter is within 2 %.
   EXPECT_EQ(path.steps, (std::vector<std::size_t>{1, 4, 5, 6}));
   EXPECT_EQ(path.rules, (std::vector<Eigen::Index>{1, 2, 3, 4}));
-  EXPECT_EQ(path.pays, (std::vector<bool>{true, true, false, true}));
   EXPECT_EQ(path.chosen, 1u);
   EXPECT_EQ(path.yardstick, 0.99);
   EXPECT_TRUE(path.is_within_loss);
-  EXPECT_EQ(path.with_rules(3, true), 1u);
-  EXPECT_EQ(path.with_rules(3, false), 2u);
-  EXPECT_EQ(path.with_rules(400, true), 3u);
+  EXPECT_EQ(path.with_rules(3), 2u);
+  EXPECT_EQ(path.with_rules(400), 3u);
 }
 
 TEST(Path, ATreeIsNoWorseThanTheBestSingleEquation) {
@@ -64,6 +62,19 @@ TEST(Path, ATreeIsNoWorseThanTheBestSingleEquation) {
   const llmt::Path far = llmt::path_of(without, rule, -1);
   EXPECT_FALSE(far.is_within_loss);
   EXPECT_EQ(far.steps[far.chosen], 2u);
+}
+
+TEST(Path, ATreeThatIsUnlikeThoseWhoseErrorsAreKnownIsNotTaken) {
+  std::vector<llmt::ComparedTree> trees = {compared(0, 1, 1, 9.0, 9.0), compared(1, 2, 20, 1.0, 1.0),
+                                           compared(2, 2, 15, 1.0, 1.0), compared(3, 3, 10, 1.0, 1.0)};
+  trees[2].extents.back().size = 12;  // shorter than its folds' trees
+  trees[3].extents.back().rules = 2;  // with fewer rules
+  const llmt::PathRule rule{.loss = 0.1, .least = 0.0, .weights = {1.0, 1.0}, .crisp_squares = {}};
+  const llmt::Path path = llmt::path_of(trees, rule, -1);
+  EXPECT_EQ(path.steps, (std::vector<std::size_t>{0, 1}));
+  EXPECT_EQ(path.steps[path.chosen], 1u);
+  // For the folds, whose own trees are like the others, they stand.
+  EXPECT_EQ(llmt::path_of(trees, rule, 0).steps, (std::vector<std::size_t>{0, 2, 3}));
 }
 
 TEST(Path, AFoldDoesNotChooseTheTreeThatItJudges) {
@@ -101,6 +112,7 @@ TEST(Readable, AStepIsTakenByItsRulesAndSaysWhatItCostsOnNewRows) {
   EXPECT_EQ(path[usual.partitions[0].taken].leaves, usual.partitions[0].leaves);
   EXPECT_EQ(path[usual.partitions[0].taken].size, usual.partitions[0].size);
   const Waves fresh = waves(4000, 4);
+  double before = std::numeric_limits<double>::infinity();
   for (const llmt::ReadableStep& step : path) {
     if (step.leaves > 8) break;
     const llmt::ReadableResult taken = llmt::fit_readable(prepared, fitted, {.rules = step.leaves});
@@ -108,10 +120,13 @@ TEST(Readable, AStepIsTakenByItsRulesAndSaysWhatItCostsOnNewRows) {
     EXPECT_EQ(taken.partitions[0].size, step.size);
     EXPECT_EQ(taken.partitions[0].rmse, step.rmse);
     const double rmse = std::sqrt((taken.model.predict(fresh.inputs) - fresh.outputs).squaredNorm() / 4000.0);
-    // What is said is not too small. It is too large where folds have other numbers of rules at the same price.
-    EXPECT_GT(step.rmse / rmse, 0.85) << step.leaves;
-    const bool is_default = step.leaves == usual.partitions[0].leaves;
-    EXPECT_LT(step.rmse / rmse, is_default ? 1.25 : 1.8) << step.leaves;
+    // What is said is not too small: 500 rows give a root mean square within 3 % as a rule, and the folds' trees, of
+    // 400 rows, are worse. Some folds have a rule less at the same price, so that it may be as large as the error of
+    // the step before, but no larger.
+    EXPECT_GT(step.rmse / rmse, 0.9) << step.leaves;
+    EXPECT_LT(step.rmse, 1.1 * before) << step.leaves;
+    if (step.leaves == usual.partitions[0].leaves) EXPECT_LT(step.rmse / rmse, 1.25);
+    before = rmse;
   }
   EXPECT_THROW(llmt::fit_readable(prepared, fitted, {.rules = -1}), std::invalid_argument);
 }

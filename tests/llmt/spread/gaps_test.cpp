@@ -112,6 +112,21 @@ TEST(Gaps, AreInTheUnitsOfTheInputsAndIgnoreMissingValues) {
 }
 
 // A new row of a hole is in a gap and its interval wider, by the tree and the sum, in memory and from a file.
+TEST(Gaps, HaveValuesBetweenTheirEndsWhereManyRowsAreAtTheSmallestOne) {
+  llmt::Random random(5);
+  Eigen::MatrixXd x(400, 2);
+  for (Eigen::Index i = 0; i < 400; ++i)
+    x.row(i) << (i % 2 == 0 ? 0.0 : random.uniform(1.0, 2.0)), random.uniform(-1.0, 1.0);
+  const std::vector<llmt::Gap> gaps = llmt::fit_gaps(x, {0, 1});
+  for (const llmt::Gap& gap : gaps) {
+    for (const llmt::GapSide& side : gap.sides) EXPECT_LT(side.low, side.high);
+  }
+  EXPECT_NO_THROW(llmt::check_gaps(gaps, 2));
+  Eigen::MatrixXd between(1, 2);
+  between << 0.5, 0.0;
+  EXPECT_EQ(llmt::rows_in_gaps(gaps, between).size(), 1u);
+}
+
 TEST(Gaps, MakeIntervalsWider) {
   const auto output = [](const Eigen::MatrixXd& x, std::uint64_t seed) {
     llmt::Random random(seed);
