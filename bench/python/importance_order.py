@@ -36,12 +36,13 @@ def line(name, folder, rows, repeats):
                                    n_repeats=repeats, random_state=1)
     above = own[own["increase"] > 2 * own["standard_error"]]
     place = {f"x{j}": j for j in range(table.shape[1] - 1)}
-    order = [place[name] for name in above.index]
+    order = [place[each] for each in above.index]
     means = rival.importances_mean
     error = rival.importances_std / np.sqrt(repeats)
     swapped = [(a, b) for k, a in enumerate(order) for b in order[k + 1:] if means[a] < means[b]]
     clear = [(a, b) for a, b in swapped if means[b] - means[a] > 2 * np.hypot(error[a], error[b])]
-    print(f"| {name} | {len(test)} | {len(order)} of {len(place)} | {len(order) * (len(order) - 1) // 2} | {len(swapped)} | {len(clear)} "
+    pairs = len(order) * (len(order) - 1) // 2
+    print(f"| {name} | {len(test)} | {len(order)} of {len(place)} | {pairs} | {len(swapped)} | {len(clear)} "
           f"| {', '.join(header[j] for j in order[:4])} |", flush=True)
     return len(swapped), len(clear)
 

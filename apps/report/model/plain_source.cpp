@@ -25,6 +25,12 @@ struct Variables {
   std::vector<PlainDefinition> definitions;
 };
 
+// Whether a single equation goes on beyond the training rows. Its slopes there may be written out.
+bool continues(const Partition& partition) {
+  return partition.num_leaves() == 1 &&
+         (partition.outer_slope.size() == 0 || partition.outer_slope == partition.nodes.front().slope);
+}
+
 class Writer {
  public:
   Writer(const Model& model, const PlainWords& words) : model_(model), words_(words) {}
@@ -66,7 +72,7 @@ class Writer {
     }
     made.regressor.resize(has_slope.size());
     std::vector<std::string> factors(used.size());
-    const bool is_held = partition.num_leaves() > 1 || partition.outer_slope.size() > 0;
+    const bool is_held = !continues(partition);
     for (std::size_t k = 0; k < has_slope.size(); ++k) {
       if (!has_slope[k]) continue;
       const Regressor& regressor = model_.regressors()[k];
