@@ -128,7 +128,7 @@ def test_the_model_in_use_is_the_chosen_one(table, readable):
 def test_both_errors_are_drawn(readable):
     pytest.importorskip("matplotlib").use("agg")
     labels = [text.get_text() for text in readable.plot_error().get_legend().get_texts()]
-    assert "this model, readable: 0.1002" in labels
+    assert "this model, readable: 0.09946" in labels
     assert "most accurate, with the spread of folds: 0.09045" in labels
 
 
@@ -166,7 +166,7 @@ def test_one_category_is_named_alike_everywhere():
     y = np.where(town == "Prague", 5.0 * X["x"], 20.0 - X["x"]) + 0.1 * rng.normal(size=400)
     model = LocalLinearTreeRegressor(validity="crisp", max_leaves=2).fit(X, y)
     for words in (*model.rules_["if"], *model.leaves_["where"]):
-        assert words in ("town = Prague", "town in {Brno, Plzen}")
+        assert words in ("town = Prague", "town not in {Prague}")
         assert words in str(model)
 
 

@@ -24,6 +24,7 @@ TREE = {
     "monotonic_cst": {"b": 1},
     "shared_tree": True,
     "readable": True,
+    "readable_rules": 2,
     "teach": True,
     "random_state": 7,
     "n_jobs": 2,
@@ -98,7 +99,7 @@ def test_beyond_one_memory_a_parameter_means_what_it_means_in_fit(name):
         state = distributed.start(list(X.columns), "y", block_rows=120, estimator=estimator)
     except ValueError as refused:
         assert name in str(refused) and "beyond one memory" in str(refused)
-        assert name in {"rule", "local_models", "loss", "categorical_features", "monotonic_cst", "readable", "teach"}
+        assert name in {"rule", "local_models", "loss", "categorical_features", "monotonic_cst", "readable", "readable_rules", "teach"}
         return
     while distributed.status(state)["step"] != "finished":
         state = distributed.advance(state, distributed.sums(state, X, y))

@@ -340,7 +340,8 @@ def plot_all(
     plot_predicted(observed, predicted, below[0], tree.targets[0], rows)
     plot_error_over_leaves(summary, below[1], target, readable)
     if isinstance(importance, tuple):
-        plot_increase(*importance, ax=below[2], most=12, name=tree.targets[0])
+        inputs, increase, errors = importance
+        plot_increase(inputs, increase, errors, below[2], 12, tree.targets[0])
     else:
         plot_importance(names, importance, below[2], 12)
     figure.draw_without_rendering()  # the tree's letters follow the size of its axes
