@@ -256,7 +256,7 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
     // A state of the inputs takes all rows to compute, and its constants are fitted with everything else.
     if (constant.smooth && !ColumnCache::is_state_of_inputs(own)) {
       constants = refined(trials, own.constants, constants, gains[k]);
-    } else if (!own.regime.empty() && own.constants.size() == 1 && constant.tried.size() > 1) {
+    } else if (!constant.smooth && own.constants.size() == 1 && constant.tried.size() > 1) {
       constants(0) =
           refined_threshold(trials, constant.tried, constants(0), gains[k], static_cast<double>(data.samples.size()));
     }

@@ -116,8 +116,10 @@ std::vector<ModelTerm> regime_terms(const Inputs& inputs, const std::vector<Mode
     for (const ModelTerm& term : library) {
       const bool is_cause = !term.generic && !term.history && term.inner_state.empty() && !term.code.empty();
       const bool is_own = std::ranges::find(term.inputs, inputs.names[j]) != term.inputs.end();
-      // An offset beyond a threshold is the term step, and one constant is that of the term.
-      if (!is_cause || term.family == "offset" || term.constants.size() > (is_own ? 0 : 1)) continue;
+      // An offset beyond a threshold is the term step, and so is a sign; one constant is that of the term.
+      if (!is_cause || term.family == "offset" || (is_own && term.family == "sign") ||
+          term.constants.size() > (is_own ? 0 : 1))
+        continue;
       for (const bool above : {true, false}) terms.push_back(in_regime(term, inputs.names[j], j, tried, above));
     }
   }
