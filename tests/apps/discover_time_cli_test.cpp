@@ -179,6 +179,21 @@ TEST(DiscoverInTime, ADelayIsAppliedToOtherRunsByTheirTimes) {
       << few.err;
 }
 
+// What has a past leads to a model that has one, by a command that runs as it is printed.
+TEST(DiscoverInTime, AnInnerStateNamesTheCommandOfAModelThatMoves) {
+  const Folder folder;
+  write_log(folder, "log", 2, 200, 0.012, 0.0, 1);
+  const std::string text = folder.run(discover + "log_s.csv log_m.csv" + in_time).out;
+  const std::size_t begin = text.find("Next: llmt fit ");
+  ASSERT_NE(begin, std::string::npos) << text;
+  const std::string words = text.substr(begin + 15, text.find('\n', begin) - begin - 15);
+  EXPECT_EQ(words, "log_m.csv --target u --inputs q,dq,ddq --lags auto --time t --groups run -o model.json");
+  const Outcome fitted = folder.run(LLMT_PROGRAM " fit " + words);
+  EXPECT_EQ(fitted.exit_code, 0) << fitted.err;
+  write_log(folder, "drag", 2, 200, 0.0, 0.5, 1);
+  EXPECT_EQ(folder.run(discover + "drag_s.csv drag_m.csv" + in_time).out.find("Next: "), std::string::npos);
+}
+
 // A load of 60 % of the torque rings behind its spring at each reversal.
 TEST(DiscoverInTime, AResonanceIsAppliedToOtherRows) {
   const Folder folder;
