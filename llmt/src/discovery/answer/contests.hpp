@@ -53,8 +53,8 @@ struct Advantage {
 Advantage advantage(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
                     double independent_share);
 
-/// Whether something is left that no term without a regime explains: more than twice the noise, as far as that is
-/// known, and the answer says so, or what is left is alike in neighbouring rows.
+/// Whether something is left that no term without a regime explains: more than 1.2 times the noise, as far as that is
+/// known, on the rows searched or set aside, and the answer says so, or what is left is alike in neighbouring rows.
 bool leaves_something(const Missing& missing);
 
 /// The indices of terms that act in a regime alone.
