@@ -199,6 +199,15 @@ TEST(Contests, FewerNumbersHaveTheNameWhereRowsCannotTell) {
   nothing.answer = Answer::undecided;
   EXPECT_EQ(better_of(found, nothing, {-1.9, 1.0}).found.size(), 1u);
 
+  // A threshold of 0 is no number.
+  Missing beyond = log.answer({"linear"}, 1.09);
+  beyond.found[0].regime = "x";
+  beyond.found[0].constants = Eigen::VectorXd::Zero(1);
+  const Missing two = log.answer({"square", "cube"});
+  EXPECT_EQ(better_of(two, beyond, {0.0, 1.0}).found.size(), 1u);
+  beyond.found[0].constants(0) = 0.5;
+  EXPECT_EQ(better_of(two, beyond, {0.0, 1.0}).found.size(), 2u);
+
   // Terms of both have no rival.
   const Missing both = better_of(log.answer({"square", "saturation"}), log.answer({"square", "linear"}), {0.0, 1.0});
   EXPECT_EQ(both.found[0].family, "square");

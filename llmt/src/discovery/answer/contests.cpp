@@ -115,6 +115,8 @@ Eigen::Index fitted_numbers(const Missing& missing) {
   Eigen::Index count = 0;
   for (const FoundTerm& term : missing.found) {
     count += (term.whole ? 0 : term.coefficients.size()) + term.constants.size();
+    // A threshold of 0 is no fitted number.
+    if (!term.regime.empty() && term.constants(term.constants.size() - 1) == 0.0) --count;
   }
   return count;
 }
