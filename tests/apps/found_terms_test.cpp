@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -65,13 +66,14 @@ discovery::FoundTerm found_of(const discovery::ModelTerm& term, llmt::Random& ra
   return found;
 }
 
-Json json_of(const Sample& sample, std::vector<discovery::FoundTerm> found) {
+Json json_of(const Sample& sample, std::vector<discovery::FoundTerm> found,
+             discovery::Answer answer = discovery::Answer::named) {
   TermsSummary summary;
   summary.inputs = sample.inputs.names;
   summary.ranges = ranges_of(sample.inputs);
   summary.order = sample.inputs.order;
   summary.missing.found = std::move(found);
-  summary.missing.answer = discovery::Answer::named;
+  summary.missing.answer = answer;
   summary.missing.gaps = {{.output = "y"}};
   summary.missing.zero_bands = sample.inputs.zero_bands;
   return terms_json(summary);
@@ -136,6 +138,26 @@ TEST(FoundTerms, AppliedAreTheSameAsTheLibrarysOwn) {
   }
 }
 
+// What the function in C adds at each row.
+Eigen::VectorXd of_compiled(const program::Folder& folder, const FoundTerms& found, const Sample& sample) {
+  folder.write("correction.c", correction_code(found, CodeLanguage::c));
+  folder.write("main.c",
+               "#include <stdio.h>\ndouble correction(double, double, double, double, double, double, double);\n"
+               "int main(void) {\n  double x[7];\n"
+               "  while (scanf(\"%lf %lf %lf %lf %lf %lf %lf\", x, x + 1, x + 2, x + 3, x + 4, x + 5, x + 6) == 7)\n"
+               "    printf(\"%.17g\\n\", correction(x[0], x[1], x[2], x[3], x[4], x[5], x[6]));\n  return 0;\n}\n");
+  std::string in;
+  for (Eigen::Index i = 0; i < sample.simulated.size(); ++i) {
+    for (const double value : sample.inputs.values.row(i)) in += fmt::format("{} ", value);
+    in += fmt::format("{}\n", sample.simulated(i));
+  }
+  folder.write("in", in);
+  const program::Outcome outcome = folder.run(
+      "cc -std=c99 -O1 -Wall -Wextra -Werror -pedantic correction.c main.c -o correct -lm && echo y && ./correct < in");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  return llmt::Csv::parse(outcome.out, "output").numbers("y");
+}
+
 TEST(FoundTerms, AsCAreTheSameFunction) {
   if (std::system("command -v cc >/dev/null") != 0) GTEST_SKIP() << "no C compiler";
   const program::Folder folder;
@@ -148,25 +170,37 @@ TEST(FoundTerms, AsCAreTheSameFunction) {
     if (!is_history(term)) all.push_back(found_of(term, random));
   }
   const FoundTerms found = found_terms(json_of(own, all), "found.json");
-  folder.write("correction.c", correction_code(found, CodeLanguage::c));
-  folder.write("main.c",
-               "#include <stdio.h>\ndouble correction(double, double, double, double, double, double, double);\n"
-               "int main(void) {\n  double x[7];\n"
-               "  while (scanf(\"%lf %lf %lf %lf %lf %lf %lf\", x, x + 1, x + 2, x + 3, x + 4, x + 5, x + 6) == 7)\n"
-               "    printf(\"%.17g\\n\", correction(x[0], x[1], x[2], x[3], x[4], x[5], x[6]));\n  return 0;\n}\n");
-  std::string in;
-  for (Eigen::Index i = 0; i < own.simulated.size(); ++i) {
-    for (const double value : own.inputs.values.row(i)) in += fmt::format("{} ", value);
-    in += fmt::format("{}\n", own.simulated(i));
-  }
-  folder.write("in", in);
-  const program::Outcome outcome = folder.run(
-      "cc -std=c99 -O1 -Wall -Wextra -Werror -pedantic correction.c main.c -o correct -lm && echo y && ./correct < in");
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  const Eigen::VectorXd code = llmt::Csv::parse(outcome.out, "output").numbers("y");
+  const Eigen::VectorXd code = of_compiled(folder, found, own);
   const Eigen::VectorXd expected = apply(found, own.inputs.values, own.simulated).col(0) - own.simulated;
   ASSERT_EQ(code.size(), expected.size());
   EXPECT_LE(largest(code - expected), 1e-12 * largest(expected));
+}
+
+// A law holds beyond the rows that it was found in; a function that was fitted to an unknown effect does not.
+TEST(FoundTerms, OfAnUnknownEffectHoldWhereRowsEnd) {
+  if (std::system("command -v cc >/dev/null") != 0) GTEST_SKIP() << "no C compiler";
+  const program::Folder folder;
+  const Sample own = sample();
+  llmt::Random random(4);
+  std::vector<discovery::FoundTerm> all;
+  for (const discovery::ModelTerm& term : discovery::standard_terms(own.inputs)) {
+    const bool is_of_b = std::ranges::find(term.inputs, "b") != term.inputs.end();
+    if (!is_history(term) && is_of_b) all.push_back(found_of(term, random));
+  }
+  ASSERT_GT(all.size(), 20);
+  const FoundTerms law = found_terms(json_of(own, all), "found.json");
+  const FoundTerms fit = found_terms(json_of(own, all, discovery::Answer::unknown), "found.json");
+  const auto added = [&](const FoundTerms& found, const Eigen::MatrixXd& inputs) {
+    return Eigen::VectorXd(apply(found, inputs, own.simulated).col(0) - own.simulated);
+  };
+  EXPECT_EQ(added(law, own.inputs.values), added(fit, own.inputs.values));
+  Sample far = own;
+  far.inputs.values.col(1).array() = 0.1 + 3.0 * (far.inputs.values.col(1).array() - 0.1);
+  const Eigen::MatrixXd held = far.inputs.values.cwiseMin(own.inputs.values.colwise().maxCoeff().replicate(60, 1));
+  ASSERT_GT(largest(added(law, far.inputs.values) - added(law, held)), 0.1);
+  EXPECT_EQ(added(fit, far.inputs.values), added(law, held));
+  const Eigen::VectorXd code = of_compiled(folder, fit, far);
+  EXPECT_LE(largest(code - added(law, held)), 1e-12 * largest(code));
 }
 
 TEST(ExpressionCode, KeepsTheOrderOfOperators) {

@@ -26,6 +26,7 @@ struct Body {
   std::string name;
   std::vector<std::string> arguments;
   std::vector<std::pair<std::string, double>> zero_bands;  // arguments that count as 0 below
+  std::vector<FoundTerms::Input> held;                     // arguments that are held between low and high
   std::string adjusted;                                    // what is done to the simulated value first; empty: nothing
   std::vector<std::string> summands;
   std::vector<std::string> titles;
@@ -38,6 +39,7 @@ Body body_of(const FoundTerms& found, std::size_t o, CodeLanguage language) {
   for (const FoundTerms::Input& input : found.inputs) {
     body.arguments.push_back(input.word);
     if (input.zero_band > 0.0) body.zero_bands.emplace_back(input.word, input.zero_band);
+    if (found.is_held) body.held.push_back(input);
   }
   std::vector<std::string> variables = body.arguments;
   variables.push_back(output.word);
@@ -101,6 +103,10 @@ std::string c_function(const Body& body) {
   for (const auto& [word, band] : body.zero_bands) {
     text += fmt::format("  if (fabs({0}) < {1}) {0} = 0.0; /* at rest */\n", word, band);
   }
+  for (const FoundTerms::Input& input : body.held) {
+    text += fmt::format("  {0} = fmin(fmax({0}, {1}), {2}); /* as far as it was seen */\n", input.word, input.low,
+                        input.high);
+  }
   text += fmt::format("  double change = {};\n", body.adjusted.empty() ? "0.0" : body.adjusted);
   if (!body.adjusted.empty()) text += fmt::format("  {} += change;\n", body.arguments.back());
   for (std::size_t k = 0; k < body.summands.size(); ++k) {
@@ -114,6 +120,10 @@ std::string python_function(const Body& body) {
   std::string text = fmt::format("\n\ndef {}({}):\n", body.name, fmt::join(body.arguments, ", "));
   for (const auto& [word, band] : body.zero_bands) {
     text += fmt::format("    {0} = np.where(np.abs({0}) < {1}, 0.0, {0})  # at rest\n", word, band);
+  }
+  for (const FoundTerms::Input& input : body.held) {
+    text +=
+        fmt::format("    {0} = np.clip({0}, {1}, {2})  # as far as it was seen\n", input.word, input.low, input.high);
   }
   text += fmt::format("    change = {}\n", body.adjusted.empty() ? "0.0" : body.adjusted);
   if (!body.adjusted.empty()) text += fmt::format("    {0} = {0} + change\n", body.arguments.back());

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "expressions/expression.hpp"
+#include "llmt/discovery/search.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "report/text/text.hpp"
 
@@ -171,12 +172,15 @@ Eigen::VectorXd values_of(const FoundTerms& found, const FoundTerms::Term& term,
     }
     places.push_back(input - found.inputs.begin());
   }
+  const auto value_of = [&](Eigen::Index i, Eigen::Index place) {
+    if (place == inputs.values.cols()) return base(i);
+    const double value = inputs.values(i, place);
+    return found.is_held ? std::clamp(value, found.inputs[place].low, found.inputs[place].high) : value;
+  };
   Eigen::VectorXd values(base.size());
   std::vector<double> variables(places.size());
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    for (std::size_t k = 0; k < places.size(); ++k) {
-      variables[k] = places[k] < inputs.values.cols() ? inputs.values(i, places[k]) : base(i);
-    }
+    for (std::size_t k = 0; k < places.size(); ++k) variables[k] = value_of(i, places[k]);
     values(i) = expression.value(variables);
   }
   return values;
@@ -231,6 +235,7 @@ FoundTerms found_terms(const Json& json, const std::string& file) {
     if (json.value("may_be_applied", true)) {
       for (const Json& parameter : json.at("parameters")) read_parameter(parameter, found);
       read_terms(json, found);
+      found.is_held = json.value("verdict", "") == discovery::to_string(discovery::Answer::unknown);
     } else {
       found.refused = json.at("verdict").get<std::string>();
     }

@@ -54,6 +54,9 @@ struct FoundTerms {
   /// The verdict of a search that has found nothing to be added, discovery::may_be_applied(); then there are no terms
   /// and no changes. Empty: there is something.
   std::string refused;
+  /// The verdict is that an effect is unknown: the terms are fitted functions of what was seen, no laws. Beyond the
+  /// rows that were searched their inputs count as low or high.
+  bool is_held = false;
 
   std::vector<std::string> input_names() const;
   std::vector<std::string> output_names() const;
