@@ -240,6 +240,7 @@ void remember_errors(CalibrationRecord& record, const Eigen::VectorXd& left_out_
   const Eigen::VectorXd errors = honest.empty() ? left_out_mm : Eigen::VectorXd::Map(honest.data(), std::ssize(honest));
   const auto freedom = static_cast<double>(std::max<Eigen::Index>(1, errors.size() - 1));
   record.held_out_mm = errors.mean();
+  record.held_out_poses = errors.size();
   record.held_out_sd_mm = (errors.array() - errors.mean()).matrix().norm() / std::sqrt(freedom);
 }
 

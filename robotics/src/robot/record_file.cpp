@@ -98,6 +98,7 @@ CalibrationRecord read_record(YamlMap map, const Robot& robot) {
   record.noise_mm = not_negative("noise_mm");
   if (map.has("held_out_mm")) record.held_out_mm = not_negative("held_out_mm");
   if (map.has("held_out_sd_mm")) record.held_out_sd_mm = not_negative("held_out_sd_mm");
+  if (map.has("held_out_poses")) record.held_out_poses = count("held_out_poses");
   if (map.has("made_from")) record.made_from = read_provenance(map.map("made_from"));
   if (map.has("joint_ranges")) record.joint_ranges = read_ranges(map, robot.chain);
   if (map.has("condition_ranges")) record.condition_ranges = read_conditions(map.map("condition_ranges"));
@@ -115,7 +116,7 @@ CalibrationRecord read_record(YamlMap map, const Robot& robot) {
       }
     }
   }
-  map.finish({"poses", "coordinates", "noise_mm", "held_out_mm", "held_out_sd_mm", "made_from", "joint_ranges",
+  map.finish({"poses", "coordinates", "noise_mm", "held_out_mm", "held_out_sd_mm", "held_out_poses", "made_from", "joint_ranges",
               "condition_ranges", "correlations"});
   return record;
 }
@@ -127,6 +128,7 @@ void write_record(YamlWriter& out, const Chain& chain, const CalibrationRecord& 
       .number("noise_mm", record.noise_mm);
   if (record.held_out_mm) out.number("held_out_mm", *record.held_out_mm);
   if (record.held_out_sd_mm) out.number("held_out_sd_mm", *record.held_out_sd_mm);
+  if (record.held_out_poses > 0) out.number("held_out_poses", static_cast<double>(record.held_out_poses));
   if (record.made_from) write_provenance(out, *record.made_from);
   if (!record.joint_ranges.empty()) write_ranges(out, chain, record);
   if (!record.condition_ranges.empty()) write_conditions(out, record);

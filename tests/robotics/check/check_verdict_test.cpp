@@ -115,5 +115,19 @@ TEST(CheckVerdict, BadReadingsOfTheCalibrationDoNotRaiseTheLimit) {
   }
 }
 
+// A search sets few poses aside, and their mean may by chance be far below that of other poses.
+TEST(CheckVerdict, FewPosesLeftOutMakeNoFalseAlarm) {
+  int alarms = 0;
+  for (std::uint64_t draw = 1; draw <= 2 * draws; ++draw) {
+    CorrectedRobot robot = calibrated(draw);
+    const Measurements aside = measured(arm(), 12, 900 + draw);
+    remember_errors(*robot.robot.calibration, distances(positions(robot.robot, aside.poses), aside));
+    EXPECT_EQ(robot.robot.calibration->held_out_poses, 12);
+    const RobotCheck check = check_robot(robot, measured(another_day(arm()), 15, 2000 + draw));
+    alarms += check.verdict == CheckVerdict::no_longer_good ? 1 : 0;
+  }
+  EXPECT_LE(alarms, 3);  // one in a hundred; more than three of 80: one in a hundred
+}
+
 }  // namespace
 }  // namespace llmt::robotics

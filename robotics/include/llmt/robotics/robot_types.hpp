@@ -50,6 +50,7 @@ struct CalibrationRecord {
   double noise_mm = 0.0;                 ///< of the residuals of points: root mean square of a coordinate
   std::optional<double> held_out_mm;     ///< mean error on poses that took no part
   std::optional<double> held_out_sd_mm;  ///< standard deviation of these errors
+  Eigen::Index held_out_poses = 0;       ///< the number of these errors; 0: that of the poses
   std::vector<std::array<double, 2>> joint_ranges;  ///< J, that the poses had; deg or mm as limits; empty: not known
   /// Smallest and largest value of what the readings were taken under: payload_kg, temp_C.
   std::map<std::string, std::array<double, 2>> condition_ranges = {};
