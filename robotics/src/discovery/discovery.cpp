@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -173,17 +174,30 @@ bool repeats_hide_noise(const Findings& found, const std::vector<Objection>& obj
   return !is_all_clear(found, objections) && repeats.has_enough_repeats() && repeats.p_value < significant;
 }
 
-// A discovery of robots and errors alone.
-Discovery of_robots(Robots robots, const PoseSplit& split, const discovery::LackOfFit& lack_of_fit, double noise_mm) {
-  const Verification verified = verify(robots, split, lack_of_fit, noise_mm);
-  remember_held_out_errors(split, robots.improved);
+// What the search of some poses gives: all of them, or those that were not set aside.
+struct Searched {
+  PoseSplit split;
+  Unmapped plain;
+  Findings found;
+  std::vector<Objection> objections;
+  Robots robots;
+  discovery::LackOfFit lack_of_fit;
+  bool once_each = false;  // repeats of a pose were averaged
+  bool is_exact = false;   // the calibrated model leaves nothing; there are no findings
+};
+
+// A discovery of robots and errors alone. `judging`: the search that the poses set aside took no part in.
+Discovery of_robots(Robots robots, const Searched& answer, const Searched& judging, bool is_withdrawn,
+                    double noise_mm) {
+  const Robots judged = is_withdrawn ? withdrawn(judging.robots) : judging.robots;
+  remember_held_out_errors(judging.split, judged.improved, robots.improved);
   Discovery result;
+  result.held_out = verify(judged, judging.split, answer.lack_of_fit, noise_mm);
+  result.fitted_before = figures({robots.before, {}}, answer.split.searched);
+  result.fitted_after = figures(robots.improved, answer.split.searched);
   result.before = std::move(robots.before);
   result.improved = std::move(robots.improved);
   result.maps = std::move(robots.maps);
-  result.fitted_before = verified.fitted_before;
-  result.fitted_after = verified.fitted_after;
-  result.held_out = verified.held_out;
   return result;
 }
 
@@ -194,20 +208,21 @@ void forget_names(Findings& found, std::vector<Objection>& objections) {
   objections.push_back({Reason::worse_fit});
 }
 
-Discovery without_gap(const Robot& robot, const PoseSplit& split, const DiscoveryOptions& options) {
-  const Robots robots = withdrawn({calibrate(robot, split.samples, options.calibration).robot, {}, {}, {}});
-  Discovery result = of_robots(robots, split, {}, 0.0);
+Discovery without_gap(const Robot& robot, Searched answer, const DiscoveryOptions& options) {
+  answer.robots = withdrawn({calibrate(robot, answer.split.samples, options.calibration).robot, {}, {}, {}});
+  Discovery result = of_robots(answer.robots, answer, answer, false, 0.0);
   result.notes.emplace_back(
       "The calibrated model reproduces the measurements to rounding: there is no gap to explain.");
-  if (const auto note = far_poses_note(robots, split)) result.notes.push_back(*note);
+  if (const auto note = far_poses_note(answer.robots, answer.split)) result.notes.push_back(*note);
   return result;
 }
 
 // An instrument's error has the image of one of the arm where this, searched for alone, explains the poses set aside as
 // well.
-std::optional<Objection> judge_instrument(const Robot& robot, const Unmapped& plain, const PoseSplit& split,
-                                          const Robots& robots, const Findings& found, const DiscoveryOptions& options,
-                                          Work& work) {
+std::optional<Objection> judge_instrument(const Robot& robot, const Searched& judging, const Findings& found,
+                                          const DiscoveryOptions& options, Work& work) {
+  const PoseSplit& split = judging.split;
+  const Unmapped& plain = judging.plain;
   const auto is_of_instrument = [](const Name& name) { return nature_of(name.effect.effect) == Nature::instrument; };
   if (std::ranges::none_of(found.names, is_of_instrument) || split.test.count() < 3) return {};
   DiscoveryOptions of_arm = options;
@@ -216,6 +231,7 @@ std::optional<Objection> judge_instrument(const Robot& robot, const Unmapped& pl
   const Robots others = fit_robots(robot, split.samples, plain.maps, other, of_arm);
   if (others.is_worse || other.names.empty()) return {};
   const auto errors = [&](const Robots& of) { return distances(positions(of.improved, split.test.poses), split.test); };
+  const Robots& robots = judging.robots;
   if (paired_difference(errors(others), errors(robots)).is_beyond_chance()) return {};
   Objection objection{Reason::arm_instead};
   for (std::size_t k = 0; k < found.names.size(); ++k) {
@@ -230,75 +246,101 @@ std::optional<Objection> judge_instrument(const Robot& robot, const Unmapped& pl
   return objection;
 }
 
-// The stages, in the order in which they need each other:
-//
-// - split: poses are set aside for the verification before anything is looked at;
-// - calibrate: an error that rigid geometry can imitate is no evidence for an effect;
-// - search: names, patterns and joint maps. It is repeated with averaged poses if a judge of the repeats asks for it;
-// - judge: all judges see the same findings, and raise objections without changing them;
-// - fit: both robots are fitted to all poses searched, for the last judge and for the user;
-// - verify: the poses set aside are the last judge;
-// - describe: the table of decide() makes an answer of verdict and objections, once.
-Discovery discover_readings(const Robot& robot, const Measurements& measurements,
-                            const std::optional<Measurements>& test, const DiscoveryOptions& options, Work& work) {
-  const auto split_with = [&](Repeats repeats) {
-    return set_aside(measurements, test, options.held_out_share, options.seed, repeats);
-  };
+// Searches the poses that `split_with` does not set aside.
+Searched searched_poses(const Robot& robot, const std::function<PoseSplit(Repeats)>& split_with,
+                        const DiscoveryOptions& options, Work& work) {
   PoseSplit split = split_with(Repeats::as_marked);
-  if (split.samples.count() * std::ranges::count(measurements.measured, true) < 10) {
+  if (split.samples.count() * std::ranges::count(split.samples.measured, true) < 10) {
     throw std::invalid_argument(
         fmt::format("llmt::robotics::discover: {} poses to search are too few", split.samples.count()));
   }
   Unmapped plain = unmapped(robot, split.samples);
-  Investigation start = calibrated(robot, plain, options, work);
-  if (is_exact(start.baseline.robot, start.searched)) return without_gap(robot, split, options);
-  Findings found = search(std::move(start), options);
-  std::vector<Objection> objections = judge(found, options);
-  const discovery::LackOfFit lack_of_fit = found.investigation.verdict.lack_of_fit;
-  const bool once_each = repeats_hide_noise(found, objections);
-  if (once_each) {
-    split = split_with(Repeats::averaged);
-    plain = unmapped(robot, split.samples);
-    found = search(calibrated(robot, plain, options, work), options);
-    objections = judge(found, options);
+  Searched answer{std::move(split), std::move(plain), {}, {}, {}, {}};
+  Investigation start = calibrated(robot, answer.plain, options, work);
+  answer.is_exact = is_exact(start.baseline.robot, start.searched);
+  if (answer.is_exact) return answer;
+  answer.found = search(std::move(start), options);
+  answer.objections = judge(answer.found, options);
+  answer.lack_of_fit = answer.found.investigation.verdict.lack_of_fit;
+  answer.once_each = repeats_hide_noise(answer.found, answer.objections);
+  const auto search_again = [&](const DiscoveryOptions& with) {
+    answer.found = search(calibrated(robot, answer.plain, with, work), with);
+    answer.objections = judge(answer.found, with);
+  };
+  if (answer.once_each) {
+    answer.split = split_with(Repeats::averaged);
+    answer.plain = unmapped(robot, answer.split.samples);
+    search_again(options);
   }
-  Robots robots = fit_robots(robot, split.samples, plain.maps, found, options);
-  if (robots.is_worse && !found.maps.empty()) {
+  answer.robots = fit_robots(robot, answer.split.samples, answer.plain.maps, answer.found, options);
+  if (answer.robots.is_worse && !answer.found.maps.empty()) {
     // What was found before the maps may stand without them.
     DiscoveryOptions without_maps = options;
     without_maps.maps = false;
-    found = search(calibrated(robot, plain, without_maps, work), without_maps);
-    objections = judge(found, without_maps);
-    robots = fit_robots(robot, split.samples, plain.maps, found, without_maps);
-    found.notes.emplace_back(
+    search_again(without_maps);
+    answer.robots = fit_robots(robot, answer.split.samples, answer.plain.maps, answer.found, without_maps);
+    answer.found.notes.emplace_back(
         "Free maps of the joints were tried and taken back: the refit with them did not converge to anything better.");
   }
+  return answer;
+}
+
+// The stages, in the order in which they need each other:
+//
+// - calibrate: an error that rigid geometry can imitate is no evidence for an effect;
+// - search: names, patterns and joint maps. It is repeated with averaged poses if a judge of the repeats asks for it;
+// - judge: all judges see the same findings, and raise objections without changing them;
+// - fit: both robots are fitted to the poses searched, for the last judge and for the user;
+// - verify: all of this is done again without the poses set aside, which are the last judge;
+// - describe: the table of decide() makes an answer of verdict and objections, once.
+//
+// Names, values and the robot that is written are those of all poses: which poses are set aside changes the error that
+// is stated, not the answer.
+Discovery discover_readings(const Robot& robot, const Measurements& measurements,
+                            const std::optional<Measurements>& test, const DiscoveryOptions& given, Work& work) {
+  DiscoveryOptions options = given;
+  options.seed = 1;
+  const auto answer_without = [&](double share) {
+    const auto split_with = [&](Repeats repeats) { return set_aside(measurements, test, share, given.seed, repeats); };
+    return searched_poses(robot, split_with, options, work);
+  };
+  Searched answer = answer_without(0.0);
+  const std::optional<Searched> without =
+      test || given.held_out_share == 0.0 ? std::nullopt : std::optional(answer_without(given.held_out_share));
+  const Searched& judging = without ? *without : answer;
+  if (answer.is_exact || judging.is_exact) return without_gap(robot, judging, options);
+  const PoseSplit& split = judging.split;
+  Findings& found = answer.found;
+  std::vector<Objection>& objections = answer.objections;
   Notes notes = found.notes;
   for (const Objection& one : objections) add(one.notes, notes);
-  add(input_mistakes(plain.robot, found.investigation, unmapped(robot, split.test).measurements,
+  add(input_mistakes(answer.plain.robot, found.investigation, unmapped(robot, split.test).measurements,
                      is_all_clear(found, objections)),
       notes);
-  add(robots.notes, notes);
-  if (once_each) notes.emplace_back("Repeats of a pose scatter less than the rest: each pose was counted once.");
-  if (const auto note = far_poses_note(robots, split)) notes.push_back(*note);
-  if (robots.is_worse) forget_names(found, objections);
-  const std::optional<PairedDifference> gain = held_out_gain(robots, split);
-  const Refits refits = robots.is_worse ? Refits{} : refits_of(robots, split, found, options);
+  add(answer.robots.notes, notes);
+  if (answer.once_each) notes.emplace_back("Repeats of a pose scatter less than the rest: each pose was counted once.");
+  if (const auto note = far_poses_note(judging.robots, split)) notes.push_back(*note);
+  const bool is_worse = answer.robots.is_worse;
+  if (is_worse) forget_names(found, objections);
+  const std::optional<PairedDifference> gain = held_out_gain(judging.robots, split);
+  const Refits refits = is_worse ? Refits{} : refits_of(answer.robots, answer.split, found, options);
   if (const std::optional<Objection> fails = judge_refits(refits)) objections.push_back(*fails);
-  if (const std::optional<Objection> arm = judge_instrument(robot, plain, split, robots, found, options, work)) {
+  if (const std::optional<Objection> arm = judge_instrument(robot, judging, found, options, work)) {
     objections.push_back(*arm);
     add(arm->notes, notes);
   }
   const std::optional<Objection> loss = judge_held_out_loss(gain, found.names.size());
-  const bool is_withdrawn = robots.is_worse || loss;
+  const bool is_withdrawn = is_worse || loss;
   if (loss) {
     objections.push_back(*loss);
     add(loss->notes, notes);
-    robots = withdrawn(std::move(robots));
+    answer.robots = withdrawn(std::move(answer.robots));
   }
   const double noise_mm = noise_of(found);
-  std::vector<std::string> statable = is_withdrawn ? Notes{} : could_state(robots, split, found, options);
-  Discovery result = described(of_robots(std::move(robots), split, lack_of_fit, noise_mm), found, objections, split);
+  std::vector<std::string> statable =
+      is_withdrawn ? Notes{} : could_state(judging.robots, split, judging.found, options);
+  Discovery result =
+      described(of_robots(answer.robots, answer, judging, is_withdrawn, noise_mm), found, objections, answer.split);
   result.held_out.gain = gain.value_or(PairedDifference{});
   for (std::size_t k = 0; k < std::min(result.effects.size(), refits.names.size()); ++k) {
     result.effects[k].refits = refits.count;
@@ -307,7 +349,7 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
   }
   result.could_state = std::move(statable);
   result.withdrawn = is_withdrawn;
-  result.lack_of_fit = lack_of_fit;
+  result.lack_of_fit = answer.lack_of_fit;
   result.noise_mm = noise_mm;
   result.notes = std::move(notes);
   return result;

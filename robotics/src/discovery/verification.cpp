@@ -14,11 +14,6 @@
 namespace llmt::robotics {
 namespace {
 
-ErrorFigures figures(const CorrectedRobot& robot, const Measurements& measurements) {
-  const Eigen::VectorXd errors = distances(positions(robot, measurements.poses), measurements);
-  return error_figures(errors(position_rows(measurements.poses)));
-}
-
 Eigen::Index count_of_stands(const Poses& poses) {
   if (poses.observations.empty()) return poses.count();
   std::set<Eigen::Index> stands;
@@ -109,29 +104,36 @@ std::optional<std::string> far_poses_note(const Robots& robots, const PoseSplit&
       count, errors.size(), typical);
 }
 
-Verification verify(const Robots& robots, const PoseSplit& split, const discovery::LackOfFit& lack_of_fit,
-                    double noise_mm) {
-  Verification verified;
-  verified.fitted_before = figures({robots.before, {}}, split.searched);
-  verified.fitted_after = figures(robots.improved, split.searched);
-  if (split.test.count() > 0) {
-    const Measurements common = along_fitted_axes(split);
-    verified.held_out.before = figures({robots.before, {}}, common);
-    verified.held_out.after = figures(robots.improved, common);
-    verified.held_out.poses = count_of_stands(split.test.poses);
-    verified.held_out.rows = split.aside;
-  }
-  verified.held_out.floor_from_repeats = lack_of_fit.has_enough_repeats();
-  verified.held_out.floor_mm = mean_distance(verified.held_out.floor_from_repeats ? lack_of_fit.noise : noise_mm,
-                                             std::ranges::count(split.searched.measured, true));
-  return verified;
+Eigen::VectorXd position_errors(const CorrectedRobot& robot, const Measurements& measurements) {
+  const Eigen::VectorXd errors = distances(positions(robot, measurements.poses), measurements);
+  return errors(position_rows(measurements.poses));
 }
 
-void remember_held_out_errors(const PoseSplit& split, CorrectedRobot& improved) {
-  std::optional<CalibrationRecord>& record = improved.robot.calibration;
+ErrorFigures figures(const CorrectedRobot& robot, const Measurements& measurements) {
+  return error_figures(position_errors(robot, measurements));
+}
+
+HeldOut verify(const Robots& robots, const PoseSplit& split, const discovery::LackOfFit& lack_of_fit, double noise_mm) {
+  HeldOut held_out;
+  if (split.test.count() > 0) {
+    const Measurements common = along_fitted_axes(split);
+    held_out.before_mm = position_errors({robots.before, {}}, common);
+    held_out.after_mm = position_errors(robots.improved, common);
+    held_out.before = error_figures(held_out.before_mm);
+    held_out.after = error_figures(held_out.after_mm);
+    held_out.poses = count_of_stands(split.test.poses);
+    held_out.rows = split.aside;
+  }
+  held_out.floor_from_repeats = lack_of_fit.has_enough_repeats();
+  held_out.floor_mm = mean_distance(held_out.floor_from_repeats ? lack_of_fit.noise : noise_mm,
+                                    std::ranges::count(split.searched.measured, true));
+  return held_out;
+}
+
+void remember_held_out_errors(const PoseSplit& split, const CorrectedRobot& judged, CorrectedRobot& written) {
+  std::optional<CalibrationRecord>& record = written.robot.calibration;
   if (split.test.count() < 2 || !record || split.test.measured != split.searched.measured) return;
-  const Eigen::VectorXd all = distances(positions(improved, split.test.poses), split.test);
-  remember_errors(*record, all(position_rows(split.test.poses)));
+  remember_errors(*record, position_errors(judged, split.test));
 }
 
 }  // namespace llmt::robotics

@@ -43,18 +43,16 @@ std::optional<Objection> judge_held_out_loss(const std::optional<PairedDifferenc
 /// choice depends on them.
 std::optional<std::string> far_poses_note(const Robots& robots, const PoseSplit& split);
 
-/// Errors of both robots on the poses searched, and on those set aside along the axes that were fitted.
-struct Verification {
-  ErrorFigures fitted_before;
-  ErrorFigures fitted_after;
-  HeldOut held_out;
-};
+/// Position errors, mm, one of each position row.
+Eigen::VectorXd position_errors(const CorrectedRobot& robot, const Measurements& measurements);
+ErrorFigures figures(const CorrectedRobot& robot, const Measurements& measurements);
 
-/// `noise_mm` is the standard deviation of one coordinate unless the repeats of `lack_of_fit` are enough to give it.
-Verification verify(const Robots& robots, const PoseSplit& split, const discovery::LackOfFit& lack_of_fit,
-                    double noise_mm);
+/// Errors of both robots on the poses set aside, along the axes that were fitted. `noise_mm` is the standard deviation
+/// of one coordinate unless the repeats of `lack_of_fit` are enough to give it.
+HeldOut verify(const Robots& robots, const PoseSplit& split, const discovery::LackOfFit& lack_of_fit, double noise_mm);
 
-/// Writes the errors on the poses set aside into the robot's record of its calibration, for a later check.
-void remember_held_out_errors(const PoseSplit& split, CorrectedRobot& improved);
+/// Writes the errors of `judged` on the poses set aside into the record of the calibration of `written`, for a later
+/// check.
+void remember_held_out_errors(const PoseSplit& split, const CorrectedRobot& judged, CorrectedRobot& written);
 
 }  // namespace llmt::robotics

@@ -109,11 +109,10 @@ std::vector<std::string> error_sentences(const Discovery& found) {
     lines.push_back(fmt::format("Mean error on the poses searched, none set aside: {:.4f} -> {:.4f} mm.",
                                 found.fitted_before.mean, found.fitted_after.mean));
   } else {
-    lines.push_back(
-        fmt::format("Mean error on {} poses that took no part: {:.4f} -> {:.4f} mm (95 % {:.4f} -> {:.4f}, largest "
-                    "{:.4f} -> {:.4f}).",
-                    held.poses, held.before.mean, held.after.mean, held.before.p95, held.after.p95, held.before.max,
-                    held.after.max));
+    lines.push_back(fmt::format(
+        "Mean error on {} poses {}: {:.4f} -> {:.4f} mm (95 % {:.4f} -> {:.4f}, largest {:.4f} -> {:.4f}).", held.poses,
+        held.rows.empty() ? "that took no part" : "of what was found without them", held.before.mean, held.after.mean,
+        held.before.p95, held.after.p95, held.before.max, held.after.max));
   }
   if (held.gain.mean > 0.0 && !held.gain.is_beyond_chance()) {
     lines.push_back(

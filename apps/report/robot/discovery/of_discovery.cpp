@@ -73,7 +73,10 @@ struct Gap {
 
 Gap gap_of(const Discovery& found) {
   if (found.held_out.poses == 0) return {found.fitted_before, found.fitted_after, "the poses that were searched"};
-  return {found.held_out.before, found.held_out.after, fmt::format("{} poses that took no part", found.held_out.poses)};
+  const robotics::HeldOut& held = found.held_out;
+  return {held.before, held.after,
+          fmt::format("{} poses, {}", held.poses,
+                      held.rows.empty() ? "that took no part" : "of what was found without them")};
 }
 
 Chart gap_chart(const Discovery& found) {

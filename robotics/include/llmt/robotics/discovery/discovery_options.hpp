@@ -24,7 +24,8 @@ struct DiscoveryOptions {
   std::vector<EffectType> catalogue = effect_types();
   CalibrationOptions calibration = {};
   discovery::SearchOptions search = {};
-  /// Share of the poses that is set aside before anything is looked at; not used where test measurements are given.
+  /// Share of the poses that a second discovery does without, to state its error there. The names and the robot that is
+  /// written are those of all poses. Not used where test measurements are given.
   double held_out_share = 0.2;
   bool scans = true;     ///< look for the orders of transmission errors and for the rows of knocks in the residuals
   bool patterns = true;  ///< try patterns without a physical cause; they carry the answer "unknown effect"
@@ -33,8 +34,8 @@ struct DiscoveryOptions {
   /// Relative standard deviation of the masses in the description. It is part of the standard errors of compliances and
   /// flexibilities, because the data determine only their products with the masses.
   double mass_uncertainty = 0.05;
-  int rounds = 4;  ///< of search and nonlinear refit
-  std::uint64_t seed = 1;
+  int rounds = 4;          ///< of search and nonlinear refit
+  std::uint64_t seed = 1;  ///< deals the poses set aside; nothing else depends on it
   Progress progress = {};  ///< the steps are "calibrating", "searching, round 1", ...
 };
 

@@ -93,8 +93,8 @@ struct Visible {
 };
 
 struct HeldOut {
-  ErrorFigures before;  ///< of the calibrated robot as described
-  ErrorFigures after;   ///< of Discovery::improved
+  ErrorFigures before;  ///< of the robot as described, calibrated without the poses set aside
+  ErrorFigures after;   ///< with what is found without them; test measurements: of Discovery::improved
   /// Error before minus error with what was found, reading by reading, mm. What was found is written if the mean is
   /// above 0.
   PairedDifference gain;
@@ -102,6 +102,8 @@ struct HeldOut {
   bool floor_from_repeats = false;
   Eigen::Index poses = 0;
   std::vector<Eigen::Index> rows;  ///< of the measurements, from 0, that were set aside; none of test measurements
+  Eigen::VectorXd before_mm;       ///< position errors of the readings set aside, in their order
+  Eigen::VectorXd after_mm;
 };
 
 /// The answer in the words of a page for people. Answer, headline and FoundEffect::confirmed come from one table
