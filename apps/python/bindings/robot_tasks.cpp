@@ -48,8 +48,21 @@ nb::object page_of(bool wanted, const std::function<report::Document()>& documen
   return nb::cast(report::filled_page(report::empty_page(), made, origin));
 }
 
+// The record of a call, as record_of() of llmt.robotics writes it.
+robotics::Provenance provenance_of(const std::string& made_from) {
+  const report::Json json = report::Json::parse(made_from);
+  robotics::Provenance made{.program = json.at("program"), .date = json.at("date"), .sources = {}, .options = {}};
+  for (const report::Json& file : json.at("files")) {
+    made.sources.push_back({file.at("role"), file.at("name"), file.at("sha256")});
+  }
+  for (const report::Json& option : json.at("options")) made.options.push_back(option);
+  made.instrument = json.at("instrument");
+  made.serial_number = json.at("serial_number");
+  return made;
+}
+
 // A robot that a task made of another one.
-Arm made_from(const Arm& arm, robotics::CorrectedRobot robot) {
+Arm arm_of(const Arm& arm, robotics::CorrectedRobot robot) {
   robot.robot.correction_file.clear();
   return {arm.name, std::move(robot), arm.urdf};
 }
@@ -61,8 +74,8 @@ ReadTest test_reader(const std::optional<Source>& test, const std::vector<std::s
 }
 
 nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<Source>& test, const Reading& reading,
-                   bool correct, int folds, bool contiguous, bool new_session, bool robust,
-                   const std::vector<std::string>& fixed, const std::vector<std::string>& only,
+                   const std::string& made_from, bool correct, int folds, bool contiguous, bool new_session,
+                   bool robust, const std::vector<std::string>& fixed, const std::vector<std::string>& only,
                    const std::map<std::string, double>& priors, int max_leaves, Eigen::Index min_leaf,
                    const std::string& accept_suspicion, double limit_mm, std::uint64_t seed, int threads, bool quality,
                    bool page, const nb::object& report) {
@@ -100,10 +113,11 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
   if (!run->refusal.empty()) outcome.warn()(finding("not_converged", run->refusal));
   std::ranges::for_each(run->measurements.warnings, outcome.warn());
   std::ranges::for_each(run->input_mistakes, outcome.warn());
+  run->report.calibration.robot.calibration->made_from = provenance_of(made_from);
   const report::Document document = report::calibration_document(*run);
   nb::dict result = outcome.dict(report::document_text(document), report::calibration_json(*run, ""));
   result["document"] = report::to_json(document).dump(-1, ' ', false, report::Json::error_handler_t::replace);
-  result["robot"] = made_from(arm, run->report.best());
+  result["robot"] = arm_of(arm, run->report.best());
   nb::dict errors;
   for (const report::JudgedModel& model : run->models) {
     const bool held_out = model.stage.held_out_mm.size() > 0;
@@ -122,9 +136,9 @@ std::vector<robotics::EffectType> catalogue_of(const std::optional<Source>& sour
 }
 
 nb::dict discover(const Arm& arm, const Source& measured, const std::optional<Source>& test, const Reading& reading,
-                  double held_out, int folds, bool contiguous, const std::optional<Source>& catalogue,
-                  double mass_uncertainty, const std::string& accept_suspicion, std::uint64_t seed, bool page,
-                  const nb::object& report) {
+                  const std::string& made_from, double held_out, int folds, bool contiguous,
+                  const std::optional<Source>& catalogue, double mass_uncertainty, const std::string& accept_suspicion,
+                  std::uint64_t seed, bool page, const nb::object& report) {
   require_page(page);
   Outcome outcome(python_face(measured.second));
   report::DiscoveryTask task{.robot_file = arm.name, .folds = folds, .contiguous = contiguous};
@@ -149,14 +163,24 @@ nb::dict discover(const Arm& arm, const Source& measured, const std::optional<So
   } catch (const std::runtime_error& error) {
     throw refused(error.what(), outcome.warnings());
   }
+  if (auto& record = run->found.improved.robot.calibration) record->made_from = provenance_of(made_from);
   nb::dict result = outcome.dict(report::discovery_text(*run, measured.first, report::no_width_limit, outcome.face()),
                                  report::discovery_run_json(*run));
-  result["robot"] = made_from(arm, run->found.improved);
+  result["robot"] = arm_of(arm, run->found.improved);
+  const std::vector<bool> set_aside = report::are_set_aside(*run);
+  const auto errors_of = [&](const robotics::CorrectedRobot& robot, const Eigen::VectorXd& judging) {
+    std::vector<double> errors = numbers_of(robotics::distances(robotics::positions(robot, judged->poses), *judged));
+    Eigen::Index next = 0;
+    for (std::size_t k = 0; k < set_aside.size(); ++k) {
+      if (set_aside[k]) errors[k] = judging(next++);
+    }
+    return errors;
+  };
   nb::dict errors;
-  errors["before"] = numbers_of(robotics::distances(robotics::positions(run->found.before, judged->poses), *judged));
-  errors["after"] = numbers_of(robotics::distances(robotics::positions(run->found.improved, judged->poses), *judged));
+  errors["before"] = errors_of({run->found.before, {}}, run->found.held_out.before_mm);
+  errors["after"] = errors_of(run->found.improved, run->found.held_out.after_mm);
   result["errors"] = errors;
-  result["set_aside"] = report::are_set_aside(*run);
+  result["set_aside"] = set_aside;
   result["page"] = page_of(page, [&] {
     return report::discovery_report(
         {arm.name, measured.first, report::points_of(run->measurements), run->found, run->next});
@@ -315,12 +339,12 @@ nb::dict export_geometry(const Arm& arm, const Arm* nominal, const Arm* origins,
 void add_robot_tasks(nb::module_& module) {
   using nb::arg;
   module.def("calibrate", &calibrate, arg("robot"), arg("measured"), arg("test").none(), arg("reading"), nb::kw_only(),
-             arg("correct"), arg("folds"), arg("contiguous"), arg("new_session"), arg("robust"), arg("fixed"),
-             arg("only"), arg("priors"), arg("max_leaves"), arg("min_leaf"), arg("accept_suspicion"), arg("limit_mm"),
-             arg("seed"), arg("threads"), arg("quality"), arg("page"), arg("report").none());
+             arg("made_from"), arg("correct"), arg("folds"), arg("contiguous"), arg("new_session"), arg("robust"),
+             arg("fixed"), arg("only"), arg("priors"), arg("max_leaves"), arg("min_leaf"), arg("accept_suspicion"),
+             arg("limit_mm"), arg("seed"), arg("threads"), arg("quality"), arg("page"), arg("report").none());
   module.def("discover", &discover, arg("robot"), arg("measured"), arg("test").none(), arg("reading"), nb::kw_only(),
-             arg("held_out"), arg("folds"), arg("contiguous"), arg("catalogue").none(), arg("mass_uncertainty"),
-             arg("accept_suspicion"), arg("seed"), arg("page"), arg("report").none());
+             arg("made_from"), arg("held_out"), arg("folds"), arg("contiguous"), arg("catalogue").none(),
+             arg("mass_uncertainty"), arg("accept_suspicion"), arg("seed"), arg("page"), arg("report").none());
   module.def("check", &check, arg("robot"), arg("measured"), arg("reading"), nb::kw_only(), arg("same_session"),
              arg("accuracy_mm").none(), arg("level"), arg("report").none());
   module.def("poses", &poses, arg("robot"), arg("reading"), nb::kw_only(), arg("count"), arg("candidates").none(),

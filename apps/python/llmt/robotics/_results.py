@@ -123,8 +123,8 @@ class Discovery(_WithRobot, Findings):
     @property
     def poses(self) -> Any:
         """Distance in mm between the measurement and the model ``before`` and ``after``, a row for each measured point.
-        ``set_aside``: the point took no part in the search and judges what it found. With test poses the rows are
-        theirs, and all are set aside."""
+        ``set_aside``: the errors are those of the models that were made without this point. With test poses the rows
+        are theirs, and all are set aside."""
         count = len(self._errors["before"])
         aside = self._set_aside or [True] * count
         rows = zip(self._errors["before"], self._errors["after"], aside, strict=True)

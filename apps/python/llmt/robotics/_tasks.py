@@ -21,6 +21,7 @@ import numpy as np
 from llmt._files import write_text
 from llmt._results import names, number
 from llmt.robotics._csv import Source, frame_of, source_of
+from llmt.robotics._record import record_of, source_of_columns
 from llmt.robotics._results import Calibration, Check, Commands, Discovery, PoseChoice
 from llmt.robotics._robot import RobotWarning, _extension, _reading, _warned
 from llmt.robotics._robot import robot as _robot_of
@@ -30,6 +31,12 @@ Progress = Callable[[int, int, str], Any]
 _MOST = 2**63 - 1
 _LARGEST = 1.7976931348623157e308
 _SMALLEST = 5e-324
+
+
+def _described(arm: Any) -> Source:
+    """A description as it was given: the file, or its text."""
+    name: str = arm._bound.name
+    return (name, None) if os.path.exists(name) else (f"<{name}>", arm.to_yaml())
 
 
 def _optional(table: Any, what: str) -> Source | None:
@@ -123,6 +130,8 @@ def calibrate(
     seed: int = 1,
     threads: int = 0,
     quality: bool = False,
+    instrument: str = "",
+    serial_number: str = "",
     report: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
@@ -158,6 +167,8 @@ def calibrate(
         0: all. The result does not depend on it.
     quality
         The result says also how well the poses determine the parameters.
+    instrument, serial_number
+        For the record in the description: what measured, and the robot's serial number.
     report
         HTML file to write.
 
@@ -170,14 +181,26 @@ def calibrate(
     """
     if new_session and test is None:
         raise ValueError("new_session is about test, which is not given")
+    arguments = dict(locals())
     arm = _robot_of(robot)
     given = _checked(source_of(measured, "measured"), columns, arm)
+    tested = _optional(test, "test")
     priors = {name: number(f"prior {name}", sigma, 1e-9, _LARGEST) for name, sigma in (prior or {}).items()}
     made = _extension().calibrate(
         arm._bound,
         given,
-        _optional(test, "test"),
+        tested,
         _reading(columns, orientations, decimal_comma),
+        made_from=record_of(
+            calibrate,
+            arguments,
+            {
+                "description": _described(arm),
+                "measurements": given,
+                "test": tested,
+                "column map": source_of_columns(columns),
+            },
+        ),
         correct=bool(correct),
         folds=_folds(folds),
         contiguous=bool(contiguous),
@@ -216,6 +239,8 @@ def discover(
     mass_uncertainty: float = 0.05,
     accept_suspicion: str = "",
     seed: int = 1,
+    instrument: str = "",
+    serial_number: str = "",
     report: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Discovery:
@@ -226,7 +251,8 @@ def discover(
     robot, measured
         A robot, see :func:`robot`, and a table of measurements.
     test, held_out
-        Measurements that take no part until the end; without them this share of the poses is set aside, by ``seed``.
+        Measurements that take no part until the end. Without them everything is done once more without this share of
+        the poses, drawn by ``seed``, to state the error there; names and robot are those of all poses.
     folds, contiguous
         Repeats the whole discovery without each fold and judges it on that fold, 0: does not; blocks of rows.
     orientations
@@ -235,7 +261,7 @@ def discover(
         Effects to look for and their plausible sizes: a YAML file, or a dict with its keys.
     mass_uncertainty
         Relative standard deviation of the described masses.
-    accept_suspicion
+    accept_suspicion, instrument, serial_number
         As in :func:`calibrate`.
     report
         HTML file to write.
@@ -246,17 +272,27 @@ def discover(
         Also where the calibrated robot misses the points by so much that no effect explains it, and where a mistake in
         the tables explains them, as in :func:`calibrate`.
     """
+    arguments = dict(locals())
     arm = _robot_of(robot)
-    effects: Source | None = None
-    if isinstance(catalogue, Mapping):
-        effects = ("<catalogue>", json.dumps(catalogue))
-    elif catalogue is not None:
-        effects = (os.fspath(catalogue), None)
+    effects = source_of_columns(catalogue)
+    given = _checked(source_of(measured, "measured"), columns, arm)
+    tested = _optional(test, "test")
     made = _extension().discover(
         arm._bound,
-        _checked(source_of(measured, "measured"), columns, arm),
-        _optional(test, "test"),
+        given,
+        tested,
         _reading(columns, orientations, decimal_comma),
+        made_from=record_of(
+            discover,
+            arguments,
+            {
+                "description": _described(arm),
+                "measurements": given,
+                "test": tested,
+                "catalogue": effects,
+                "column map": source_of_columns(columns),
+            },
+        ),
         held_out=number("held_out", held_out, 0.0, 0.9),
         folds=_folds(folds),
         contiguous=bool(contiguous),
