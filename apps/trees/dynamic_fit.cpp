@@ -8,6 +8,7 @@
 
 #include "llmt/fit_dynamic.hpp"
 #include "report/dynamic/dynamic_report.hpp"
+#include "report/dynamic/system_document.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 #include "shared/progress.hpp"
@@ -17,10 +18,10 @@
 namespace llmt::apps {
 namespace {
 
-constexpr std::array own_options = {"time", "for", "grid", "accept-unstable"};
-constexpr std::array taken_options = {"help",     "help-all",      "data",       "target",  "inputs", "ignore",
-                                      "groups",   "decimal-comma", "thousands",  "output",  "json",   "boost",
-                                      "readable", "rule",          "max-leaves", "threads", "lags"};
+constexpr std::array own_options = {"time", "for", "grid", "delay", "accept-unstable"};
+constexpr std::array taken_options = {"help",          "help-all",  "data",   "target", "inputs", "ignore",   "groups",
+                                      "decimal-comma", "thousands", "output", "json",   "boost",  "readable", "rule",
+                                      "max-leaves",    "threads",   "lags",   "report", "plot"};
 
 void refuse_others(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options()) {
@@ -79,6 +80,16 @@ DynamicOptions options_of(const CLI::App& command, const DynamicFitArguments& ar
       throw std::invalid_argument(fmt::format("--{}", error.what()));
     }
   }
+  const std::string& delay = arguments.dynamic.delay;
+  if (delay == "auto") {
+    options.delays.assign(series.input_names.size(), find_delay);
+  } else if (!delay.empty()) {
+    try {
+      options.delays = parse_delays(delay, series.input_names, options.lags ? 0 : find_delay);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("--{}", error.what()));
+    }
+  }
   if (command.count("--rule") > 0) {
     options.rest = RestLearner::tree;
     options.rule = arguments.learning.options.rule;
@@ -104,6 +115,11 @@ void add_dynamic_options(CLI::App& command, DynamicArguments& arguments) {
       ->type_name("LAGS");
   command.add_option("--time", arguments.time, "With --lags: the times of the rows, at equal steps [1 each]")
       ->type_name("COLUMN");
+  command
+      .add_option("--delay", arguments.delay,
+                  "With --lags: dead time of inputs in rows as u:3, from which their lags count. auto: found on "
+                  "held-out stretches, 40 rows at most [auto lags: 10 rows at most; else none]")
+      ->type_name("DELAY");
   constexpr NumberRange step = {1e-300, 1e300, "a positive number"};
   add_number(
       command, "--grid", arguments.grid, step,
@@ -145,10 +161,13 @@ void dynamic_fit_command(const CLI::App& command, const DynamicFitArguments& arg
       !arguments.output.empty() && (fit.model.parts().is_stable || arguments.dynamic.accept_unstable);
   if (is_written) save(fit.model, arguments.output);
   const report::DynamicRun run{csv.name(), is_written ? arguments.output : "", table.series, fit, options.horizon};
+  const std::string reports =
+      arguments.reports.wanted() ? write_reports(arguments.reports, report::dynamic_document(run)) : "";
   if (arguments.json) {
     print_json(report::dynamic_json(run));
   } else {
     print(report::dynamic_text(run, output_width()));
+    print(reports);
     if (is_written) print(fmt::format("Model written to {}; llmt simulate runs it\n", arguments.output));
     if (arguments.output.empty()) print("Not written: give -o FILE.json\n");
   }

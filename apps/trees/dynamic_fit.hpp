@@ -5,13 +5,15 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "shared/report_files.hpp"
 #include "trees/learning.hpp"
 
 namespace llmt::apps {
 
 /// The options of `llmt fit` that only systems that move have.
 struct DynamicArguments {
-  std::string lags;  ///< empty: a table of rows is learned
+  std::string lags;   ///< empty: a table of rows is learned
+  std::string delay;  ///< empty: none is asked for
   std::string time;
   std::string purpose = "simulation";
   double grid = 0.0;
@@ -27,6 +29,7 @@ struct DynamicFitArguments {
   bool json = false;
   bool boost = false;
   bool readable = false;
+  ReportFiles reports = {};
 };
 
 /// Throws std::invalid_argument for an option that was given and is not for systems that move, and ExitCode if the

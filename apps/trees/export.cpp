@@ -30,13 +30,20 @@ struct ExportArguments {
 constexpr std::array<std::pair<std::string_view, report::PlainLanguage>, 3> plain_languages = {
     {{"c", report::PlainLanguage::c}, {"python", report::PlainLanguage::python}, {"sql", report::PlainLanguage::sql}}};
 
+// "1 input, 2 outputs"
+template <class AnyModel>
+std::string size_text(const AnyModel& model) {
+  const auto inputs = model.num_inputs();
+  const auto outputs = model.num_outputs();
+  return fmt::format("{} input{}, {} output{}", inputs, inputs == 1 ? "" : "s", outputs, outputs == 1 ? "" : "s");
+}
+
 template <class AnyModel>
 void write_source(const ExportArguments& arguments, const AnyModel& model, const CSource& c,
                   const std::string& header) {
   const std::vector<NewFile> files = {{arguments.output, c.source}, {header, c.header}};
   write_files(files);
-  print(fmt::format("{}: {} inputs, {} outputs; written to {} and {}\n", arguments.model, model.num_inputs(),
-                    model.num_outputs(), arguments.output, header));
+  print(fmt::format("{}: {}; written to {} and {}\n", arguments.model, size_text(model), arguments.output, header));
 }
 
 void export_plain(const ExportArguments& arguments) {
@@ -48,8 +55,7 @@ void export_plain(const ExportArguments& arguments) {
       std::ranges::find(plain_languages, arguments.plain, &std::pair<std::string_view, report::PlainLanguage>::first);
   write_file(arguments.output,
              report::plain_source(model, language->second, arguments.name, without_controls(arguments.model)));
-  print(fmt::format("{}: {} inputs, {} outputs; written to {}\n", arguments.model, model.num_inputs(),
-                    model.num_outputs(), arguments.output));
+  print(fmt::format("{}: {}; written to {}\n", arguments.model, size_text(model), arguments.output));
 }
 
 void export_command(const ExportArguments& arguments) {

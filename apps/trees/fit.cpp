@@ -218,7 +218,7 @@ void add_fit(CLI::App& app) {
                     "Fit the tree to the answers of a sum of trees (--boost), on the rows and on rows made of them; "
                     "taken if its held-out error is smaller. Takes several times as long");
   add_report_options(*command, arguments->reports,
-                     "predicted against observed (and FILE.importance.svg: what matters)");
+                     "predicted against observed (and FILE.importance.svg: what matters), with --lags runs over time");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory");
   command->add_flag("--boost", arguments->boost,
@@ -246,7 +246,7 @@ void add_fit(CLI::App& app) {
     require_target(arguments->learning);
     if (!arguments->dynamic.lags.empty()) {
       dynamic_fit_command(*command, {arguments->learning, arguments->dynamic, arguments->output, arguments->json,
-                                     arguments->boost, !arguments->readable.empty()});
+                                     arguments->boost, !arguments->readable.empty(), arguments->reports});
       return;
     }
     refuse_dynamic_options(*command);

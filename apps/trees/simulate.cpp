@@ -7,10 +7,13 @@
 #include <stdexcept>
 
 #include "llmt/files.hpp"
+#include "llmt/run_band.hpp"
 #include "llmt/simulator.hpp"
 #include "report/dynamic/dynamic_report.hpp"
+#include "report/dynamic/system_document.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
+#include "shared/report_files.hpp"
 #include "shared/table_file.hpp"
 #include "trees/commands.hpp"
 #include "trees/series_table.hpp"
@@ -26,9 +29,11 @@ struct SimulateArguments {
   std::string groups;
   std::vector<double> initial;
   Eigen::Index window = 0;
+  double interval = 0.0;
   DecimalMark mark = DecimalMark::point;
   bool thousands = false;
   bool json = false;
+  ReportFiles reports;
 };
 
 std::vector<std::string> names_of_signals(const std::vector<Signal>& signals) {
@@ -67,6 +72,19 @@ Eigen::MatrixXd initial_outputs(const Csv& csv, const SimulateArguments& argumen
   return table.series.outputs.middleRows(record.begin, rows);
 }
 
+// The band of a run. What cannot be had is the file's fault, not the caller's.
+Bounds band_of(const SimulateArguments& arguments, const DynamicModel& model, const Run& run) {
+  if (model.parts().band.outputs.empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: the file has no errors of held-out runs; an earlier program wrote it, fit again", arguments.model));
+  }
+  try {
+    return run_bounds(model, run, arguments.interval);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
+  }
+}
+
 void simulate_command(const SimulateArguments& arguments) {
   const DynamicModel model = read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
                                                    [](const std::string& path) { return load_dynamic(path); });
@@ -86,19 +104,28 @@ void simulate_command(const SimulateArguments& arguments) {
   for (const std::string& output : columns.outputs) {
     simulated.has_measured = simulated.has_measured || csv.has(output);
   }
+  simulated.level = arguments.interval;
+  if (simulated.level > 0.0) simulated.band = {simulated.outputs, simulated.outputs};
   for (const Stretch& record : records_of(table.series)) {
     const Eigen::MatrixXd initial = initial_outputs(csv, arguments, model, table, record);
     simulated.runs.push_back(simulate(model, inputs.middleRows(record.begin, record.rows()), initial));
     simulated.outputs.middleRows(record.begin, record.rows()) = simulated.runs.back().outputs;
     simulated.initial = initial.rows();
+    if (arguments.interval == 0.0) continue;
+    const Bounds band = band_of(arguments, model, simulated.runs.back());
+    simulated.band.lower.middleRows(record.begin, record.rows()) = band.lower;
+    simulated.band.upper.middleRows(record.begin, record.rows()) = band.upper;
   }
   if (!arguments.output.empty()) write_file(arguments.output, report::simulated_table(simulated));
+  std::string words;
+  if (arguments.reports.wanted()) words = write_reports(arguments.reports, report::simulated_document(simulated));
   if (arguments.json) {
     print_json(report::simulated_json(simulated));
-    return;
+  } else {
+    if (arguments.output.empty()) print_bytes(report::simulated_table(simulated));
+    words = report::simulated_text(simulated) + words;
   }
-  if (arguments.output.empty()) print_bytes(report::simulated_table(simulated));
-  std::istringstream lines(report::simulated_text(simulated));
+  std::istringstream lines(words);
   for (std::string line; std::getline(lines, line);) warn(line);
 }
 
@@ -122,11 +149,16 @@ void add_simulate(CLI::App& app) {
               "The outputs at the first row, where the system is at rest [the measured ones of the first rows]");
   add_count(*command, "--window", arguments->window, Eigen::Index{0},
             "Measured rows before the run, if more than the lags need");
+  constexpr NumberRange level = {0.01, 0.9999, "a number from 0.01 to 0.9999"};
+  add_number(*command, "--interval", arguments->interval, level,
+             "Level of a band about the run, such as 0.9: adds TARGET_low and TARGET_high, between which that share of "
+             "measured values lies, as runs over held-out stretches tell");
   command->add_option("--time", arguments->time, "The times of the rows, to be checked against the model's step")
       ->type_name("COLUMN");
   command->add_option("--groups", arguments->groups, "The record of each row; each begins anew")->type_name("COLUMN");
   add_decimal_comma(*command, arguments->mark);
   add_thousands(*command, arguments->thousands);
+  add_report_options(*command, arguments->reports, "the run over time");
   command->add_flag("--json", arguments->json, "Print JSON with the run and its errors");
   command->callback([arguments] { simulate_command(*arguments); });
 }

@@ -79,7 +79,8 @@ TEST_P(Documents, ShowWhatTheCommandsPrint) {
   EXPECT_GT(commands, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Documents, testing::Values("README.md", "docs/regression.md", "docs/robots.md"),
+INSTANTIATE_TEST_SUITE_P(All, Documents,
+                         testing::Values("README.md", "docs/dynamics.md", "docs/regression.md", "docs/robots.md"),
                          [](const auto& name) {
                            std::string text(name.param);
                            for (char& c : text) c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';

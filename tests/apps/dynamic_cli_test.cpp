@@ -61,6 +61,7 @@ TEST(DynamicProgram, LearnsRunsAndExports) {
 
   const Outcome exported = folder.run(LLMT_PROGRAM " export --c m.json -o m.c --name spring");
   ASSERT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_NE(exported.out.find("m.json: 1 input, 1 output; written to"), std::string::npos) << exported.out;
   EXPECT_NE(llmt::read_file(folder.file("m.h")).find("int spring_step(struct spring_state *state"), std::string::npos);
 }
 
@@ -78,6 +79,89 @@ TEST(DynamicProgram, ARunMayBeginAtRestAndInEachRecord) {
   const Eigen::VectorXd y = llmt::Csv::parse(step.out, "out").numbers("y_simulated");
   EXPECT_EQ(y(0), 0.0);
   EXPECT_NEAR(y(2), 0.5, 0.05);  // the step is one row old
+}
+
+// Nine of ten measured values of a run that was not seen lie in the band; a file of an earlier program has none.
+TEST(DynamicProgram, ARunHasABand) {
+  const Folder folder;
+  folder.write("d.csv", spring_record(500, 5));
+  folder.write("new.csv", spring_record(800, 6));
+  const Outcome fitted = folder.run(LLMT_PROGRAM " fit d.csv -t y --lags y:1-2,u:1 --time t -o m.json");
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+  EXPECT_NE(fitted.out.find("Band of 90 % about runs of y: +-0.0"), std::string::npos) << fitted.out;
+  const Outcome run = folder.run(LLMT_PROGRAM " simulate m.json new.csv --time t --interval 0.9 --json");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json simulated = nlohmann::json::parse(run.out);
+  EXPECT_EQ(simulated["interval"], 0.9);
+  const llmt::Csv measured = llmt::Csv::parse(llmt::read_file(folder.file("new.csv")), "new.csv");
+  const Eigen::VectorXd y = measured.numbers("y");
+  int inside = 0;
+  for (int row = 2; row < 800; ++row)
+    inside += simulated["low"]["y"][row] <= y(row) && y(row) <= simulated["high"]["y"][row];
+  EXPECT_NEAR(inside / 798.0, 0.9, 0.06);
+  EXPECT_NEAR(simulated["inside"][0], inside / 798.0, 1e-12);
+
+  const Outcome table = folder.run(LLMT_PROGRAM " simulate m.json new.csv --interval 0.9");
+  ASSERT_EQ(table.exit_code, 0) << table.err;
+  const llmt::Csv written = llmt::Csv::parse(table.out, "out");
+  EXPECT_EQ(written.columns(), (std::vector<std::string>{"y_simulated", "y_low", "y_high"}));
+  EXPECT_EQ(written.numbers("y_low")(799), simulated["low"]["y"][799]);
+  EXPECT_EQ(written.numbers("y_high")(799), simulated["high"]["y"][799]);
+  EXPECT_NE(table.err.find("% of the measured values lie in the band of 90 %"), std::string::npos) << table.err;
+  EXPECT_NE(table.err.find("The held-out runs had at most 123 rows, "), std::string::npos) << table.err;
+
+  EXPECT_NE(folder.run(LLMT_PROGRAM " simulate m.json new.csv --interval 0.9999").err.find("too few"),
+            std::string::npos);
+  nlohmann::json old = nlohmann::json::parse(llmt::read_file(folder.file("m.json")));
+  old.erase("held_out_errors");
+  folder.write("old.json", old.dump());
+  EXPECT_EQ(folder.run(LLMT_PROGRAM " simulate old.json new.csv").exit_code, 0);
+  const Outcome refused = folder.run(LLMT_PROGRAM " simulate old.json new.csv --interval 0.9");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("no errors of held-out runs"), std::string::npos) << refused.err;
+}
+
+TEST(DynamicProgram, SaysWhatTheLocalModelsDoAndWhereTheyRest) {
+  const Folder folder;
+  folder.write("d.csv", spring_record(500, 7));
+  const Outcome fitted = folder.run(LLMT_PROGRAM " fit d.csv -t y --lags y:1-2,u:1 --time t --json");
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+  const nlohmann::json fit = nlohmann::json::parse(fitted.out);
+  const nlohmann::json& curve = fit["static_curves"][0];
+  EXPECT_EQ(curve["input"], "u");
+  ASSERT_EQ(curve["points"].size(), 41U);
+  for (const nlohmann::json& point : curve["points"]) {
+    const double y = point["outputs"][0];
+    // 0.24 y + 0.02 y^3 = 0.5 u
+    EXPECT_NEAR(0.24 * y + 0.02 * y * y * y, 0.5 * point["input"].get<double>(), 0.06);
+    EXPECT_EQ(point["stable"], true);
+  }
+  const nlohmann::json& local = fit["local_dynamics"][0];
+  const nlohmann::json& response = local["step_response"][0][0];
+  EXPECT_NEAR(response.back(), local["steady_gain"][0][0], 0.03 * local["steady_gain"][0][0].get<double>());
+  EXPECT_GT(local["settling_time"], 0.0);
+  EXPECT_EQ(fit["residuals"][0]["frequency"].size(), fit["residuals"][0]["run_spectrum"].size());
+  const Outcome text = folder.run(LLMT_PROGRAM " fit d.csv -t y --lags y:1-2,u:1 --time t");
+  EXPECT_NE(text.out.find("Static curve"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("settles in s"), std::string::npos) << text.out;
+}
+
+// The sample's pipe holds what flows in back for 30 s, three rows.
+TEST(DynamicProgram, FindsTheDeadTimeOfThePipe) {
+  const Folder folder;
+  const std::string fit = std::string(LLMT_PROGRAM " fit ") + LLMT_DOCS +
+                          "/samples/tank.csv -t level_m --time t_s --lags level_m:1,inflow_l_s:1 --json";
+  const Outcome found = folder.run(fit + " --delay auto -o m.json");
+  ASSERT_EQ(found.exit_code, 0) << found.err;
+  const nlohmann::json summary = nlohmann::json::parse(found.out);
+  EXPECT_EQ(summary["delays"], nlohmann::json({3}));
+  EXPECT_EQ(summary["lags"], "level_m:1,inflow_l_s:4");
+  const Outcome given = folder.run(fit + " --delay inflow_l_s:3");
+  EXPECT_EQ(nlohmann::json::parse(given.out)["held_out"], summary["held_out"]);
+  // It rests at (inflow / 10)^2.
+  for (const nlohmann::json& point : summary["static_curves"][0]["points"]) {
+    EXPECT_NEAR(point["outputs"][0], std::pow(point["input"].get<double>() / 10.0, 2), 0.08);
+  }
 }
 
 struct RefusedCall {
@@ -108,6 +192,11 @@ TEST(DynamicProgram, RefusesWithTheName) {
       {"fit d.csv -t y --lags auto --for ever", 2, "--for is \"ever\""},
       {"fit d.csv -t y --time t", 2, "give --lags too"},
       {"fit d.csv -t y --lags auto --time x", 1, "\"x\""},
+      {"fit d.csv -t y --lags auto --delay z:1", 2, "--delay: \"z:1\": there is no such input"},
+      {"fit d.csv -t y --lags auto --delay much", 2, "--delay: \"much\": auto, or INPUT:ROWS"},
+      {"fit d.csv -t y --delay auto", 2, "give --lags too"},
+      {"fit d.csv -t y --lags y:1,u:1 --ignore t --delay u:40", 1, "100 complete rows"},
+      {"simulate m.json d.csv --interval 90", 2, "--interval"},
       {"fit gap.csv -t y --lags auto --time t", 1, "the step of time to line 4 is 2"},
       {"fit torn.csv -t y --lags auto --groups run", 1, "torn.csv:4"},
       {"fit header.csv -t y --lags auto", 1, "there is a header and no rows"},

@@ -98,3 +98,60 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
         model.to_onnx()
     with pytest.raises(ValueError, match="to_sql"):
         model.to_sql()
+
+
+def test_nine_of_ten_measured_values_of_a_fresh_run_lie_in_the_band(tmp_path) -> None:
+    u, y = spring(500, 6)
+    model = DynamicLocalLinearTreeRegressor(lags="y:1-2,u:1").fit(u, y)
+    fresh_u, fresh_y = spring(900, 7)
+    band = model.simulate_interval(fresh_u, fresh_y[:2], coverage=0.9)
+    assert band.shape == (900, 2, 1)
+    run = model.simulate(fresh_u, fresh_y[:2])
+    assert (band[:, 0] <= run).all() and (run <= band[:, 1]).all()
+    assert (band[:2, 0] == band[:2, 1]).all()
+    inside = (band[2:, 0, 0] <= fresh_y[2:]) & (fresh_y[2:] <= band[2:, 1, 0])
+    assert inside.mean() == pytest.approx(0.9, abs=0.06)
+    wide = model.simulate_interval(fresh_u, fresh_y[:2], coverage=0.98)
+    assert (wide[2:, 1] > band[2:, 1]).all()
+    with pytest.raises(ValueError, match="coverage"):
+        model.simulate_interval(fresh_u, fresh_y[:2], coverage=90)
+    model.save(tmp_path / "m.json")
+    assert (DynamicLocalLinearTreeRegressor.load(tmp_path / "m.json").simulate_interval(fresh_u, fresh_y[:2]) == band).all()
+    old = json.loads((tmp_path / "m.json").read_text())
+    del old["held_out_errors"]
+    (tmp_path / "old.json").write_text(json.dumps(old))
+    with pytest.raises(ValueError, match="no errors of held-out runs"):
+        DynamicLocalLinearTreeRegressor.load(tmp_path / "old.json").simulate_interval(fresh_u, fresh_y[:2])
+    held = model.held_out_[:, 0]
+    assert np.isnan(held).sum() == 4 * 2
+    assert np.sqrt(np.nanmean((held - y) ** 2)) == pytest.approx(model.summary_["held_out"]["rmse"][0], rel=0.3)
+
+
+def test_local_models_and_states_of_rest_are_arrays() -> None:
+    u, y = spring(500, 8)
+    model = DynamicLocalLinearTreeRegressor(lags="y:1-2,u:1", rest="none").fit(u, y, dt=0.05)
+    for local in model.local_models():
+        response = local["step_response"]
+        assert response.shape[:2] == (1, 1)
+        assert response[0, 0, -1] == pytest.approx(local["steady_gain"][0, 0], rel=0.03)
+        assert len(local["poles"]) == 2 and local["stable"] and 0 < local["settling_time"] < 5
+    curve = model.static_curve("u", points=7)
+    assert len(curve["input"]) == 7 and curve["stable"].all() and len(curve["none"]) == 0
+    # Where the model rests a long run ends.
+    for value, rest in zip(curve["input"], curve["outputs"][:, 0], strict=True):
+        assert model.simulate(np.full(600, value), [0.0])[-1, 0] == pytest.approx(rest, abs=1e-6)
+    with pytest.raises(ValueError, match="no input 'w'"):
+        model.static_curve("w")
+
+
+def test_a_dead_time_is_found() -> None:
+    source = np.random.default_rng(9)
+    u = np.repeat(source.uniform(-1, 1, 100), 4)
+    y = np.zeros(400)
+    for t in range(1, 400):
+        y[t] = 0.8 * y[t - 1] + (0.5 * u[t - 6] if t >= 6 else 0.0)
+    y += 0.01 * source.standard_normal(400)
+    model = DynamicLocalLinearTreeRegressor(lags="y:1,u:1", delay="auto", rest="none").fit(u, y)
+    assert model.lags_ == "y:1,u:6" and model.summary_["delays"] == [5]
+    with pytest.raises(ValueError, match="delay"):
+        DynamicLocalLinearTreeRegressor(lags="y:1,u:1", delay="u").fit(u, y)

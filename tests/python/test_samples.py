@@ -27,6 +27,12 @@ def test_the_heat_pump_is_what_its_program_writes():
     assert made.stdout == samples.path("heat_pump.csv").read_bytes()
 
 
+def test_the_tank_is_what_its_program_writes():
+    for name, arguments in {"tank.csv": [], "tank_new.csv": ["new"]}.items():
+        made = subprocess.run([sys.executable, DOCS / "tank.py", *arguments], check=True, capture_output=True)
+        assert made.stdout == (DOCS / name).read_bytes()
+
+
 def test_the_heat_pump_with_and_without_pandas(monkeypatch):
     pandas = pytest.importorskip("pandas")
     X, y = samples.heat_pump()

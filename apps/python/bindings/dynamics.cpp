@@ -19,11 +19,14 @@
 #include "llmt/dynamic_analysis.hpp"
 #include "llmt/dynamic_source.hpp"
 #include "llmt/fit_dynamic.hpp"
+#include "llmt/run_band.hpp"
 #include "llmt/simulator.hpp"
+#include "llmt/static_curve.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/interruptible.hpp"
 #include "python/bindings/module.hpp"
 #include "report/dynamic/dynamic_report.hpp"
+#include "report/dynamic/local_words.hpp"
 
 namespace llmt::python {
 namespace {
@@ -51,8 +54,8 @@ Series series_from(const Array& inputs, const Array& outputs, std::vector<std::s
 std::unique_ptr<FittedSystem> fit_system(const Array& inputs, const Array& outputs,
                                          std::vector<std::string> input_names, std::vector<std::string> output_names,
                                          std::vector<Eigen::Index> records, double sample_time, std::string time_unit,
-                                         const std::string& lags, Eigen::Index horizon, const std::string& rest,
-                                         int threads, const nb::object& report) {
+                                         const std::string& lags, const std::string& delay, Eigen::Index horizon,
+                                         const std::string& rest, int threads, const nb::object& report) {
   auto fitted = std::make_unique<FittedSystem>();
   fitted->series = series_from(inputs, outputs, std::move(input_names), std::move(output_names), std::move(records),
                                sample_time, std::move(time_unit));
@@ -62,6 +65,11 @@ std::unique_ptr<FittedSystem> fit_system(const Array& inputs, const Array& outpu
   options.horizon = horizon;
   options.max_threads = threads;
   if (lags != "auto") options.lags = parse_lags(lags, fitted->series.input_names, fitted->series.output_names);
+  if (delay == "auto") {
+    options.delays.assign(fitted->series.input_names.size(), find_delay);
+  } else if (!delay.empty()) {
+    options.delays = parse_delays(delay, fitted->series.input_names, options.lags ? 0 : find_delay);
+  }
   if (rest == "none") {
     options.rest = RestLearner::none;
   } else if (rest == "sum") {
@@ -80,6 +88,32 @@ std::unique_ptr<FittedSystem> fit_system(const Array& inputs, const Array& outpu
 auto run_system(const DynamicModel& self, const Array& inputs, const Array& initial) {
   Run run = simulate(self, rows_of(inputs), rows_of(initial));
   return std::make_tuple(array_of<double>(std::move(run.outputs)), run.left_at, run.outside_at);
+}
+
+// The ends of the band about the run.
+auto band_of_run(const DynamicModel& self, const Array& inputs, const Array& initial, double level) {
+  Bounds bounds = run_bounds(self, simulate(self, rows_of(inputs), rows_of(initial)), level);
+  return std::make_tuple(array_of<double>(std::move(bounds.lower)), array_of<double>(std::move(bounds.upper)));
+}
+
+auto states_of_rest(const DynamicModel& self, Eigen::Index input, Eigen::Index points) {
+  const StaticCurve curve = static_curve(self, input, points);
+  const Eigen::Index count = std::ssize(curve.points);
+  Eigen::MatrixXd inputs(count, 1);
+  Eigen::MatrixXd outputs(count, self.num_outputs());
+  std::vector<bool> stable;
+  std::vector<bool> inside;
+  std::vector<bool> at_stop;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const RestPoint& point = curve.points[k];
+    inputs(k, 0) = point.input;
+    outputs.row(k) = point.outputs.transpose();
+    stable.push_back(point.is_stable);
+    inside.push_back(point.is_inside);
+    at_stop.push_back(point.is_at_stop);
+  }
+  return std::make_tuple(array_of<double>(std::move(inputs)), array_of<double>(std::move(outputs)), stable, inside,
+                         at_stop, curve.none);
 }
 
 // Predictions of the next row from measured ones; the first rows, which have no past, are NaN.
@@ -137,6 +171,10 @@ void add_dynamics(nb::module_& module) {
            })
       .def("simulate", &run_system, nb::arg("inputs"), nb::arg("initial"))
       .def("predict", &next_rows_of, nb::arg("inputs"), nb::arg("outputs"))
+      .def("band", &band_of_run, nb::arg("inputs"), nb::arg("initial"), nb::arg("level"))
+      .def("has_band", [](const DynamicModel& self) { return !self.parts().band.outputs.empty(); })
+      .def("local_models", [](const DynamicModel& self) { return report::local_json(self).dump(); })
+      .def("static_curve", &states_of_rest, nb::arg("input"), nb::arg("points"))
       .def("poles", &poles_of)
       .def(
           "c_source",
@@ -148,6 +186,7 @@ void add_dynamics(nb::module_& module) {
   nb::class_<FittedSystem>(module, "FittedSystem")
       .def("model", [](const FittedSystem& self) { return self.fit->model; })
       .def("simulated", [](const FittedSystem& self) { return array_of<double>(self.fit->simulated); })
+      .def("held_out", [](const FittedSystem& self) { return array_of<double>(self.fit->held_out); })
       .def(
           "summary",
           [](const FittedSystem& self, const std::string& data) {
@@ -162,7 +201,7 @@ void add_dynamics(nb::module_& module) {
           nb::arg("data"), nb::arg("width"));
   module.def("fit_system", &fit_system, nb::arg("inputs"), nb::arg("outputs"), nb::arg("input_names"),
              nb::arg("output_names"), nb::arg("records"), nb::arg("sample_time"), nb::arg("time_unit"), nb::arg("lags"),
-             nb::arg("horizon"), nb::arg("rest"), nb::arg("threads"), nb::arg("report").none());
+             nb::arg("delay"), nb::arg("horizon"), nb::arg("rest"), nb::arg("threads"), nb::arg("report").none());
 }
 
 }  // namespace llmt::python

@@ -9,6 +9,7 @@ import numpy as np
 
 from . import _core
 from ._progress import Bar
+from ._regressor import share
 
 
 class DynamicLocalLinearTreeRegressor:
@@ -22,6 +23,9 @@ class DynamicLocalLinearTreeRegressor:
     lags : str, default="auto"
         The earlier values that the model looks at, in rows: ``"y:1-3,u:0-4"``, of outputs from 1 on. ``"auto"``: found
         on held-out stretches.
+    delay : str or None, default=None
+        Dead time of inputs in rows, ``"u:3"``, from which their lags count. ``"auto"``: found on held-out stretches, 40
+        rows at most. None: chosen lags find up to 10 rows, given lags have none.
     purpose : {"simulation", "prediction"} or int, default="simulation"
         What the model is chosen for: free runs, predictions of the next row, or runs of so many rows.
     rest : str, default="auto"
@@ -37,6 +41,8 @@ class DynamicLocalLinearTreeRegressor:
         ``llmt fit --lags auto --json`` prints it.
     simulated_ : ndarray, (rows, outputs)
         The model's runs over its own records; NaN where there is none.
+    held_out_ : ndarray, (rows, outputs)
+        The same by models that were learned without the stretch of the row; runs begin anew in each stretch.
 
     Examples
     --------
@@ -55,11 +61,13 @@ class DynamicLocalLinearTreeRegressor:
         self,
         *,
         lags: str = "auto",
+        delay: str | None = None,
         purpose: "str | int" = "simulation",
         rest: str = "auto",
         n_jobs: int | None = None,
     ) -> None:
         self.lags = lags
+        self.delay = delay
         self.purpose = purpose
         self.rest = rest
         self.n_jobs = n_jobs
@@ -97,6 +105,7 @@ class DynamicLocalLinearTreeRegressor:
                 float(dt),
                 "s",
                 self.lags,
+                self.delay or "",
                 self._horizon(),
                 self.rest,
                 0 if self.n_jobs in (None, -1) else int(self.n_jobs or 0),
@@ -105,6 +114,7 @@ class DynamicLocalLinearTreeRegressor:
         self._handle = self._fitted.model()
         self.summary_: dict[str, Any] = json.loads(self._fitted.summary("series"))
         self.simulated_: np.ndarray = self._fitted.simulated()
+        self.held_out_: np.ndarray = self._fitted.held_out()
         return self
 
     def simulate(self, u: Any, y0: Any) -> np.ndarray:
@@ -116,6 +126,85 @@ class DynamicLocalLinearTreeRegressor:
         inputs, _ = _signals(u, "u", len(initial))
         outputs, _, _ = self._model().simulate(inputs, initial)
         return np.asarray(outputs)
+
+    def simulate_interval(self, u: Any, y0: Any, coverage: float = 0.9) -> np.ndarray:
+        """The band about the run of `simulate`, in which the share `coverage` of measured values lies.
+
+        It is as wide as the errors of runs over held-out stretches were, so many rows after they began.
+
+        Returns
+        -------
+        ndarray, (rows, 2, outputs)
+            Lower and upper ends. The rows of `y0` have no width.
+
+        Raises
+        ------
+        ValueError
+            If the file of the model has no held-out errors, or too few for the coverage.
+        """
+        level = share("coverage", coverage)
+        if not self._model().has_band():
+            raise ValueError("simulate_interval: the model has no errors of held-out runs; fit again")
+        initial, _ = _signals(y0, "y")
+        inputs, _ = _signals(u, "u", len(initial))
+        lower, upper = self._model().band(inputs, initial, level)
+        return np.stack([np.asarray(lower), np.asarray(upper)], axis=1)
+
+    def local_models(self) -> list[dict[str, Any]]:
+        """The linear models near the leaves of the tree, or near points of rest.
+
+        Returns
+        -------
+        list of dict
+            ``where``; ``poles``: z, complex; ``steady_gain``: (outputs, inputs), NaN where an output integrates;
+            ``settling_time``: until all step responses stay within 2 %, infinite where one does not settle;
+            ``step_response``: (inputs, outputs, rows), at the times ``arange(rows) * sample_time_``; ``stable``.
+        """
+        models: list[dict[str, Any]] = []
+        for local in json.loads(self._model().local_models()):
+            settling = local["settling_time"]
+            models.append(
+                {
+                    "where": local["where"],
+                    "poles": np.array([complex(pole["re"], pole["im"]) for pole in local["poles"]]),
+                    "steady_gain": np.array(local["steady_gain"], dtype=float),
+                    "settling_time": np.inf if settling is None else settling,
+                    "step_response": np.array(local["step_response"], dtype=float),
+                    "stable": local["stable"],
+                }
+            )
+        return models
+
+    def static_curve(self, input: "str | int" = 0, points: int = 41) -> dict[str, np.ndarray]:
+        """Where the model comes to rest, over the training range of one input, the others in the middle of theirs.
+
+        Parameters
+        ----------
+        input : str or int, default=0
+            The input that is varied.
+        points : int, default=41
+            Values of the input, 2 or more.
+
+        Returns
+        -------
+        dict of ndarray
+            ``input`` and ``outputs`` (states, outputs) of each state of rest, of which one value of the input may have
+            several; ``stable``, ``inside`` (the training ranges) and ``at_stop`` of each; ``none``: values of the input
+            at which no state of rest was found. Where an output adds up there are none at all.
+        """
+        names = self._model().inputs()
+        if isinstance(input, str) and input not in names:
+            raise ValueError(f"static_curve: there is no input {input!r}; there are {names}")
+        index = names.index(input) if isinstance(input, str) else int(input)
+        inputs, outputs, stable, inside, at_stop, none = self._model().static_curve(index, int(points))
+        return {
+            "input": np.asarray(inputs)[:, 0],
+            "outputs": np.asarray(outputs),
+            "stable": np.array(stable, dtype=bool),
+            "inside": np.array(inside, dtype=bool),
+            "at_stop": np.array(at_stop, dtype=bool),
+            "none": np.array(none, dtype=float),
+        }
 
     def predict(self, u: Any, y: Any) -> np.ndarray:
         """Predictions of each row from the measured rows before it: (rows, outputs), NaN for the first ones."""

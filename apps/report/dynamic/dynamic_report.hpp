@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "llmt/bounds.hpp"
 #include "llmt/dynamic_analysis.hpp"
 #include "llmt/fit_dynamic.hpp"
 #include "llmt/simulator.hpp"
@@ -34,13 +35,16 @@ struct SimulatedRecords {
   std::vector<Eigen::Index> lines;  ///< of the rows, in the file
   bool has_measured = false;        ///< the table has the outputs too
   Eigen::Index initial = 0;         ///< measured rows before each run
+  double level = 0.0;               ///< of the band; 0: none is asked for
+  Bounds band = {};                 ///< rows x outputs
 };
 
 /// Errors beside the measured outputs where there are any, and where runs left the data or the bounds.
 std::string simulated_text(const SimulatedRecords& simulated);
 Json simulated_json(const SimulatedRecords& simulated);
 
-/// The outputs as a table: NAME_simulated for each output, rows as in the file; empty where there is no run.
+/// The outputs as a table: NAME_simulated for each output, and NAME_low and NAME_high if there is a band; rows as in
+/// the file; empty where there is no run.
 std::string simulated_table(const SimulatedRecords& simulated);
 
 }  // namespace llmt::report

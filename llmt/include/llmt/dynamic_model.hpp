@@ -51,6 +51,18 @@ inline constexpr Eigen::Index most_terms = 10'000;
 /// What the polynomial leaves, learnt by a tree or a sum of trees from the same regressors; or nothing.
 using Rest = std::variant<std::monostate, Model, BoostedModel>;
 
+/// Errors of an output in free runs over stretches that were held out, some rows after the runs began.
+struct HeldOutErrors {
+  double rows = 1.0;                ///< since the last measured row: the mean of those that are pooled here
+  std::vector<double> errors = {};  ///< |measured - simulated| in the unit of the output, ascending, at most 200
+};
+
+/// What run_bounds() needs.
+struct RunBand {
+  std::vector<std::vector<HeldOutErrors>> outputs = {};  ///< one list an output, by rows; empty: nothing is known
+  Eigen::Index longest = 0;                              ///< rows of the longest held-out run
+};
+
 /// The parts of a DynamicModel.
 struct DynamicParts {
   std::vector<Signal> inputs;
@@ -61,6 +73,7 @@ struct DynamicParts {
   Polynomial polynomial;
   Rest rest = {};
   bool is_stable = true;  ///< false: a run on held-out stretches left the bounds, see DynamicModel::lower()
+  RunBand band = {};
 };
 
 /// y(t) = p(x(t)) + r(x(t)), where x are the regressors (columns_of()), p is a polynomial and r a tree, a sum of trees

@@ -29,8 +29,14 @@ enum class RestLearner {
   none        ///< polynomials alone
 };
 
+/// In place of a dead time in DynamicOptions::delays: it is found.
+inline constexpr int find_delay = -1;
+
 struct DynamicOptions {
   std::optional<Lags> lags = {};  ///< none: chosen on held-out stretches
+  /// Dead time of each input in rows: its lags count from there. find_delay: found on held-out stretches, up to 40
+  /// rows. Empty: none for `lags` that are given; for lags that are chosen up to 10 rows are found.
+  std::vector<int> delays = {};
   /// Rows that a held-out run goes on before it is begun again from measured rows; 0: to the end of its stretch
   /// (simulation); 1: prediction of the next row.
   Eigen::Index horizon = 0;
@@ -65,6 +71,7 @@ struct DynamicSummary {
   std::vector<DynamicCandidate> compared;  ///< by error, the smallest first
   std::size_t chosen = 0;                  ///< of these
   std::string continuation;                ///< outside of the training ranges: "guarded", "linear" or "polynomial"
+  std::vector<int> delays;                 ///< dead time of each input in rows where one was asked for; else empty
   RunErrors held_out;                      ///< of the chosen candidate
   RunErrors linear;                        ///< of the best linear one, on the same stretches
   RunErrors training;                      ///< of the model over its own records
@@ -74,6 +81,8 @@ struct DynamicFit {
   DynamicModel model;
   DynamicSummary summary;
   Eigen::MatrixXd simulated;  ///< rows of the series x outputs: the model's run over its records; NaN where none is
+  /// The same by models that were learned without the stretch of the row. Runs begin anew in each stretch.
+  Eigen::MatrixXd held_out = {};
 };
 
 /// The fewest complete rows that fit_dynamic() takes.

@@ -35,6 +35,13 @@ inline constexpr Eigen::Index most_lagged_columns = 1000;
 /// is not there, or a lag out of range.
 Lags parse_lags(std::string_view text, const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
 
+/// Reads dead times "u:3,v:0" in rows, one an input; `otherwise` for inputs that are not named. Throws
+/// std::invalid_argument that names the part that cannot be read, or an input that is not there or named twice.
+std::vector<int> parse_delays(std::string_view text, const std::vector<std::string>& inputs, int otherwise);
+
+/// The lags of inputs that count from a dead time on, one an input.
+Lags delayed(Lags lags, const std::vector<int>& delays);
+
 /// The text that parse_lags() reads.
 std::string text_of(const Lags& lags, const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
 

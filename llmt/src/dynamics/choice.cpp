@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "base/parallel.hpp"
+#include "dynamics/delays.hpp"
 #include "dynamics/grid.hpp"
 #include "dynamics/one_step.hpp"
 #include "llmt/dynamic_analysis.hpp"
@@ -13,16 +14,11 @@
 namespace llmt {
 namespace {
 
-// Rows that a search of lags and candidates looks at; with more rows the best ones meet again on all of them.
-constexpr Eigen::Index search_rows = 4096;
 constexpr Eigen::Index search_parts = 8;
-constexpr int search_iterations = 15;
-constexpr int final_iterations = 40;
 constexpr std::size_t kept_lags = 5;
 constexpr std::size_t kept_lags_of_many_rows = 3;
 constexpr std::size_t kept_trials = 16;
 constexpr std::size_t kept_on_all_rows = 4;
-constexpr int most_delay = 10;
 // Candidates within this factor of the smallest error are as good on held-out stretches; there, amplitudes decide.
 constexpr double as_good = 1.05;
 // A linear model of an output that adds up runs as well without its value. In 400 rows of five systems each with a pole
@@ -58,35 +54,6 @@ void keep_best(std::vector<Trial>& trials, std::size_t count) {
     }
   }
   trials = std::move(kept);
-}
-
-// No delay of the inputs that change, no lags of the others: what never changes explains nothing.
-std::vector<int> no_delays(const Task& task) {
-  std::vector<int> delays;
-  for (const Signal& input : task.inputs) delays.push_back(input.low < input.high ? 0 : -1);
-  return delays;
-}
-
-// The lag of each input from which on it helps a linear model, one input after the other.
-std::vector<int> find_delays(const Task& task, const std::vector<StretchFold>& folds, bool on_runs, Work& work) {
-  const Eigen::Index outputs = task.series.outputs.cols();
-  std::vector<int> delays = no_delays(task);
-  for (std::size_t i = 0; i < delays.size(); ++i) {
-    if (delays[i] < 0) continue;
-    std::vector<Trial> trials;
-    for (int delay = 0; delay <= most_delay; ++delay) {
-      std::vector<int> tried = delays;
-      tried[i] = delay;
-      trials.push_back({{.lags = simple_lags(tried, outputs, 2, 2), .on_runs = on_runs}});
-    }
-    Work part(work, 1.0 / static_cast<double>(delays.size()));
-    try_on(task, folds, search_iterations, trials, part);
-    double best = std::numeric_limits<double>::infinity();
-    for (const Trial& trial : trials) best = std::min(best, trial.error);
-    const auto first = std::ranges::find_if(trials, [&](const Trial& trial) { return trial.error <= 1.02 * best; });
-    delays[i] = first == trials.end() ? 0 : static_cast<int>(first - trials.begin());
-  }
-  return delays;
 }
 
 // Sets the stops at which outputs stand, if a linear model runs better with them.
@@ -235,20 +202,28 @@ Chosen choose(Task& task, const std::vector<Stretch>& stretches, const DynamicOp
   const bool has_stops = take_stops(task, searched, folds, beginning);
 
   std::vector<Lags> lags;
+  std::vector<int> asked;
+  if (!options.delays.empty()) {
+    Work delaying(work, 0.1);
+    const Lags of_linear = options.lags ? *options.lags : simple_lags(no_delays(task), std::ssize(task.outputs), 2, 2);
+    asked = asked_delays(task, folds, of_linear, options.delays, rows, delaying);
+  }
   if (options.lags) {
-    lags = {*options.lags};
+    lags = {asked.empty() ? *options.lags : delayed(*options.lags, asked)};
   } else {
     Work finding(work, 0.1);
     Work summing(finding, 0.2);
     Work delaying(finding, 0.8);
     std::vector<bool> sums;
     if (task.horizon != 1) sums = find_sums(task, searched, folds, summing);
-    const std::vector<int> delays = find_delays(task, folds, task.horizon != 1, delaying);
+    std::vector<int> delays = no_delays(task);
+    if (asked.empty()) delays = find_delays(task, folds, task.horizon != 1, delaying);
+    for (std::size_t i = 0; i < asked.size(); ++i) delays[i] = delays[i] < 0 ? -1 : asked[i];
     lags = lag_candidates(delays, std::ssize(task.outputs), rows);
     // A linear model finds no delay where the system is far from linear: one row at most is tried too.
     std::vector<int> short_delays = delays;
     for (int& delay : short_delays) delay = std::min(delay, 1);
-    if (short_delays != delays) {
+    if (asked.empty() && short_delays != delays) {
       for (Lags& tried : lag_candidates(short_delays, std::ssize(task.outputs), rows)) lags.push_back(std::move(tried));
     }
     for (Lags& tried : lags) tried = with_sums(std::move(tried), sums);
@@ -304,7 +279,7 @@ Chosen choose(Task& task, const std::vector<Stretch>& stretches, const DynamicOp
     throw std::runtime_error(
         "llmt::fit_dynamic: no candidate could be judged; the stretches are too short for the lags");
   }
-  Chosen chosen{std::move(trials), 0};
+  Chosen chosen{std::move(trials), 0, asked};
   const Trial& best = chosen.trials.front();
   double smallest = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < chosen.trials.size(); ++k) {

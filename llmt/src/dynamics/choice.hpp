@@ -23,7 +23,14 @@ struct Trial {
 struct Chosen {
   std::vector<Trial> trials;
   std::size_t chosen = 0;
+  std::vector<int> delays = {};  ///< see DynamicSummary
 };
+
+/// Rows that a search of lags and candidates looks at; with more rows the best ones meet again on all of them.
+inline constexpr Eigen::Index search_rows = 4096;
+/// Steps of the estimation on runs in the search, and where the best ones meet.
+inline constexpr int search_iterations = 15;
+inline constexpr int final_iterations = 40;
 
 /// Judges candidates on folds, all at once.
 void try_on(const Task& task, const std::vector<StretchFold>& folds, int iterations, std::vector<Trial>& trials,

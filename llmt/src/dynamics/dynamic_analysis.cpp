@@ -10,14 +10,13 @@
 #include <stdexcept>
 
 #include "base/decompositions.hpp"
+#include "dynamics/linear_near.hpp"
 #include "dynamics/one_step.hpp"
-#include "dynamics/windows.hpp"
+#include "llmt/static_curve.hpp"
 
 namespace llmt {
 namespace {
 
-constexpr Eigen::Index correlated_lags = 25;
-constexpr double quantile_of_99_per_cent = 2.5758293035489004;  // of the normal distribution, both sides
 constexpr double on_unit_circle = 1e-9;
 
 Pole pole_of(std::complex<double> z, double sample_time) {
@@ -58,112 +57,75 @@ Eigen::VectorXd mean_of_leaf(const Model& tree, const Node& node) {
   return x;
 }
 
-double correlation(const Eigen::VectorXd& first, const Eigen::VectorXd& second, Eigen::Index lag) {
-  const Eigen::Index rows = first.size() - lag;
-  return first.tail(rows).dot(second.head(rows));
-}
-
-// Values of a column on rows that follow each other, in pieces; their mean is taken away.
-std::vector<Eigen::VectorXd> centred(const std::vector<Eigen::VectorXd>& pieces) {
-  double sum = 0.0;
-  Eigen::Index count = 0;
-  for (const Eigen::VectorXd& piece : pieces) {
-    sum += piece.sum();
-    count += piece.size();
-  }
-  std::vector<Eigen::VectorXd> result = pieces;
-  for (Eigen::VectorXd& piece : result) piece.array() -= sum / static_cast<double>(std::max<Eigen::Index>(count, 1));
-  return result;
-}
-
-double sum_of_correlations(const std::vector<Eigen::VectorXd>& first, const std::vector<Eigen::VectorXd>& second,
-                           Eigen::Index lag) {
-  double sum = 0.0;
-  for (std::size_t k = 0; k < first.size(); ++k) {
-    if (first[k].size() > lag) sum += correlation(first[k], second[k], lag);
-  }
-  return sum;
-}
-
-// Errors of a run, or of the next row, in pieces without gaps, and the inputs there.
-struct Pieces {
-  std::vector<Eigen::VectorXd> errors;
-  std::vector<Eigen::MatrixXd> inputs;
-};
-
-Pieces pieces_of(const Series& series, const Eigen::MatrixXd& predicted, Eigen::Index output) {
-  Pieces pieces;
-  for (const Stretch& record : records_of(series)) {
-    Eigen::Index begin = record.begin;
-    for (Eigen::Index row = record.begin; row <= record.end; ++row) {
-      const bool is_there =
-          row < record.end && std::isfinite(predicted(row, output)) && std::isfinite(series.outputs(row, output));
-      if (is_there) continue;
-      if (row > begin) {
-        pieces.errors.emplace_back(series.outputs.col(output).segment(begin, row - begin) -
-                                   predicted.col(output).segment(begin, row - begin));
-        pieces.inputs.emplace_back(series.inputs.middleRows(begin, row - begin));
+// An oblique tree does not know where the rows of a leaf lie: its model where the system rests over the range of the
+// first input that changes, or nothing if there are less than two such states.
+std::vector<LocalDynamics> at_states_of_rest(const DynamicModel& model) {
+  constexpr Eigen::Index count = 5;
+  const std::vector<Signal>& inputs = model.parts().inputs;
+  const auto first = std::ranges::find_if(inputs, [](const Signal& input) { return input.low < input.high; });
+  if (first == inputs.end()) return {};
+  const StaticCurve curve = static_curve(model, first - inputs.begin(), count);
+  std::vector<LocalDynamics> all;
+  for (const RestPoint& point : curve.points) {
+    if (point.is_at_stop) continue;
+    Eigen::VectorXd x(std::ssize(model.columns()));
+    for (std::size_t c = 0; c < model.columns().size(); ++c) {
+      const LaggedColumn& column = model.columns()[c];
+      double& value = x(static_cast<Eigen::Index>(c));
+      if (column.is_output) {
+        value = column.minus_lag >= 0 ? 0.0 : point.outputs(column.signal);
+      } else {
+        value = column.signal == curve.input ? point.input : curve.others(column.signal);
       }
-      begin = row + 1;
     }
+    all.push_back(dynamics_at(model, x, fmt::format("at rest, {} = {:.4g}", first->name, point.input)));
   }
-  return pieces;
-}
-
-Eigen::MatrixXd next_rows(const DynamicModel& model, const Series& series) {
-  Eigen::MatrixXd predicted =
-      Eigen::MatrixXd::Constant(series.rows(), series.outputs.cols(), std::numeric_limits<double>::quiet_NaN());
-  const RegressorRows rows =
-      regressor_rows(series, model.parts().lags, complete_stretches(series, model.memory() + 1), model.memory());
-  OneStep map(model.parts());
-  Eigen::VectorXd x;
-  Eigen::VectorXd y(series.outputs.cols());
-  for (Eigen::Index k = 0; k < std::ssize(rows.rows); ++k) {
-    x = rows.regressors.row(k).transpose();
-    map.values(x.data(), y.data());
-    predicted.row(rows.rows[k]) = y.transpose() + rows.last.row(k);
-  }
-  return predicted;
+  return all.size() < 2 ? std::vector<LocalDynamics>() : all;
 }
 
 }  // namespace
 
-LocalDynamics dynamics_at(const DynamicModel& model, const Eigen::VectorXd& regressors, std::string where) {
-  if (regressors.size() != std::ssize(model.columns()) || !regressors.allFinite()) {
-    throw std::invalid_argument("llmt::dynamics_at: a finite value is needed for each regressor");
-  }
+LocalDynamics linear_near(const DynamicModel& model, const Eigen::VectorXd& regressors, const std::vector<bool>& stops,
+                          std::string where) {
   OneStep map(model.parts());
   Eigen::VectorXd y(model.num_outputs());
   Eigen::MatrixXd by_regressor;
   Eigen::MatrixXd by_parameter;
   map.derivatives(regressors.data(), y.data(), by_regressor, by_parameter);
   const Eigen::Index outputs = model.num_outputs();
-  const Eigen::Index memory = std::max<Eigen::Index>(model.memory(), 1);
-  // y(t) = sum_k A_k y(t - k) + sum_k B_k u(t - k); the state is y(t - 1), y(t - 2), ...
-  Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(outputs * memory, outputs * memory);
-  Eigen::MatrixXd of_outputs = Eigen::MatrixXd::Zero(outputs, outputs);
-  Eigen::MatrixXd of_inputs = Eigen::MatrixXd::Zero(outputs, model.num_inputs());
+  LocalDynamics local{std::move(where), {}, {}, true};
+  local.of_outputs.assign(std::max<Eigen::Index>(model.memory(), 1), Eigen::MatrixXd::Zero(outputs, outputs));
+  local.of_inputs.assign(model.memory() + 1, Eigen::MatrixXd::Zero(outputs, model.num_inputs()));
   for (std::size_t c = 0; c < model.columns().size(); ++c) {
     const LaggedColumn& column = model.columns()[c];
     const auto slope = by_regressor.col(static_cast<Eigen::Index>(c));
     if (!column.is_output) {
-      of_inputs.col(column.signal) += slope;
+      local.of_inputs[column.lag].col(column.signal) += slope;
       continue;
     }
-    companion.block(0, (column.lag - 1) * outputs + column.signal, outputs, 1) += slope;
-    if (column.minus_lag >= 0) {
-      companion.block(0, (column.minus_lag - 1) * outputs + column.signal, outputs, 1) -= slope;
-    } else {
-      of_outputs.col(column.signal) += slope;
-    }
+    // An output at a stop does not move, what pushes against the stop does.
+    const double moves = stops[column.signal] ? 0.0 : 1.0;
+    local.of_outputs[column.lag - 1].col(column.signal) += (column.minus_lag >= 0 ? 1.0 : moves) * slope;
+    if (column.minus_lag >= 0) local.of_outputs[column.minus_lag - 1].col(column.signal) -= moves * slope;
   }
   for (Eigen::Index o = 0; o < outputs; ++o) {
-    if (!adds_up(model.parts().lags, o)) continue;
-    companion(o, o) += 1.0;
-    of_outputs(o, o) += 1.0;
+    if (adds_up(model.parts().lags, o) && !stops[o]) local.of_outputs[0](o, o) += 1.0;
   }
+  // The state is y(t - 1), y(t - 2), ... as far back as outputs are looked at: lags of inputs alone move no pole.
+  Eigen::Index memory = 1;
+  for (const LaggedColumn& column : model.columns()) {
+    if (column.is_output) memory = std::max<Eigen::Index>({memory, column.lag, column.minus_lag});
+  }
+  local.of_outputs.resize(memory);
+  Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(outputs * memory, outputs * memory);
+  Eigen::MatrixXd of_outputs = Eigen::MatrixXd::Zero(outputs, outputs);
+  Eigen::MatrixXd of_inputs = Eigen::MatrixXd::Zero(outputs, model.num_inputs());
+  for (Eigen::Index k = 0; k < memory; ++k) {
+    companion.block(0, k * outputs, outputs, outputs) = local.of_outputs[k];
+    of_outputs += local.of_outputs[k];
+  }
+  for (const Eigen::MatrixXd& each : local.of_inputs) of_inputs += each;
   companion.bottomLeftCorner(outputs * (memory - 1), outputs * (memory - 1)).setIdentity();
-  LocalDynamics local{std::move(where), {}, {}, true};
   const Eigen::VectorXcd eigenvalues = Eigen::EigenSolver<Eigen::MatrixXd>(companion, false).eigenvalues();
   for (const std::complex<double> z : eigenvalues) {
     if (std::abs(z) < on_unit_circle) continue;
@@ -184,10 +146,23 @@ LocalDynamics dynamics_at(const DynamicModel& model, const Eigen::VectorXd& regr
   return local;
 }
 
+LocalDynamics dynamics_at(const DynamicModel& model, const Eigen::VectorXd& regressors, std::string where) {
+  if (regressors.size() != std::ssize(model.columns()) || !regressors.allFinite()) {
+    throw std::invalid_argument("llmt::dynamics_at: a finite value is needed for each regressor");
+  }
+  return linear_near(model, regressors, std::vector<bool>(model.num_outputs(), false), std::move(where));
+}
+
 std::vector<LocalDynamics> local_dynamics(const DynamicModel& model) {
   const DynamicParts& parts = model.parts();
   std::vector<LocalDynamics> all;
-  if (const auto* tree = std::get_if<Model>(&parts.rest)) {
+  const auto* tree = std::get_if<Model>(&parts.rest);
+  const bool is_oblique = tree != nullptr && std::ranges::any_of(tree->partitions(), [](const Partition& partition) {
+                            return partition.nodes.front().is_oblique();
+                          });
+  if (is_oblique) all = at_states_of_rest(model);
+  if (!all.empty()) return all;
+  if (tree != nullptr && !is_oblique) {
     for (std::size_t p = 0; p < tree->partitions().size(); ++p) {
       const Partition& partition = tree->partitions()[p];
       int number = 0;
@@ -211,65 +186,49 @@ std::vector<LocalDynamics> local_dynamics(const DynamicModel& model) {
   return all;
 }
 
-Eigen::Index ResidualTests::autocorrelations_outside() const {
-  return (autocorrelation.array().abs() > autocorrelation_bound).count();
+Eigen::MatrixXd step_response(const LocalDynamics& local, Eigen::Index input, Eigen::Index rows) {
+  const Eigen::Index outputs = local.steady_gain.rows();
+  if (input < 0 || input >= local.steady_gain.cols() || rows < 1) {
+    throw std::invalid_argument(
+        fmt::format("llmt::step_response: input {} and {} rows are asked for; there are {} inputs", input, rows,
+                    local.steady_gain.cols()));
+  }
+  Eigen::MatrixXd response = Eigen::MatrixXd::Zero(rows, outputs);
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    Eigen::VectorXd y = Eigen::VectorXd::Zero(outputs);
+    for (Eigen::Index lag = 0; lag < std::ssize(local.of_inputs) && lag <= row; ++lag) {
+      y += local.of_inputs[lag].col(input);
+    }
+    for (Eigen::Index lag = 1; lag <= std::ssize(local.of_outputs) && lag <= row; ++lag) {
+      y += local.of_outputs[lag - 1] * response.row(row - lag).transpose();
+    }
+    response.row(row) = y.transpose();
+  }
+  return response;
 }
 
-Eigen::Index ResidualTests::cross_correlations_outside() const {
-  Eigen::Index count = 0;
-  for (Eigen::Index i = 0; i < cross_correlation.rows(); ++i) {
-    count += (cross_correlation.row(i).array().abs() > cross_correlation_bound(i)).count();
-  }
-  return count;
-}
-
-std::vector<ResidualTests> residual_tests(const DynamicModel& model, const Series& series,
-                                          const Eigen::Ref<const Eigen::MatrixXd>& simulated) {
-  if (simulated.rows() != series.rows() || simulated.cols() != series.outputs.cols() ||
-      series.outputs.cols() != model.num_outputs() || series.inputs.cols() != model.num_inputs()) {
-    throw std::invalid_argument("llmt::residual_tests: model, series and run have different shapes");
-  }
-  const Eigen::MatrixXd predicted = next_rows(model, series);
-  std::vector<ResidualTests> all;
-  for (Eigen::Index o = 0; o < model.num_outputs(); ++o) {
-    ResidualTests tests;
-    tests.output = model.parts().outputs[o].name;
-    const std::vector<Eigen::VectorXd> next = centred(pieces_of(series, predicted, o).errors);
-    double rows = 0.0;
-    for (const Eigen::VectorXd& piece : next) rows += static_cast<double>(piece.size());
-    tests.autocorrelation_bound = quantile_of_99_per_cent / std::sqrt(rows);
-    tests.autocorrelation.resize(correlated_lags);
-    const double power = sum_of_correlations(next, next, 0);
-    for (Eigen::Index k = 1; k <= correlated_lags; ++k) {
-      tests.autocorrelation(k - 1) = power > 0.0 ? sum_of_correlations(next, next, k) / power : 0.0;
-    }
-    const Pieces run = pieces_of(series, simulated, o);
-    const std::vector<Eigen::VectorXd> errors = centred(run.errors);
-    double run_rows = 0.0;
-    for (const Eigen::VectorXd& piece : errors) run_rows += static_cast<double>(piece.size());
-    tests.cross_correlation.setZero(model.num_inputs(), correlated_lags + 1);
-    tests.cross_correlation_bound.setZero(model.num_inputs());
-    const double error_power = sum_of_correlations(errors, errors, 0);
-    for (Eigen::Index i = 0; i < model.num_inputs(); ++i) {
-      std::vector<Eigen::VectorXd> input;
-      for (const Eigen::MatrixXd& piece : run.inputs) input.emplace_back(piece.col(i));
-      input = centred(input);
-      const double input_power = sum_of_correlations(input, input, 0);
-      if (!(error_power > 0.0) || !(input_power > 0.0)) continue;
-      for (Eigen::Index k = 0; k <= correlated_lags; ++k) {
-        tests.cross_correlation(i, k) = sum_of_correlations(errors, input, k) / std::sqrt(error_power * input_power);
+Eigen::Index settled_rows(const LocalDynamics& local) {
+  constexpr Eigen::Index most = 100'000;
+  if (!local.is_stable || !local.steady_gain.allFinite()) return -1;
+  // What is left of a motion after n rows falls as |z|^n, so this many tell when it is over.
+  const double slowest = local.poles.empty() ? 0.0 : std::abs(local.poles.front().z);
+  if (slowest >= 1.0) return -1;
+  const double rows = slowest > 0.0 ? 12.0 / -std::log(slowest) : 0.0;
+  if (rows > static_cast<double>(most)) return -1;
+  const Eigen::Index count = 2 * static_cast<Eigen::Index>(rows) + std::ssize(local.of_inputs) + 1;
+  Eigen::Index settled = 0;
+  for (Eigen::Index input = 0; input < local.steady_gain.cols(); ++input) {
+    const Eigen::MatrixXd response = step_response(local, input, count);
+    for (Eigen::Index o = 0; o < response.cols(); ++o) {
+      const double end = local.steady_gain(o, input);
+      for (Eigen::Index row = count - 1; row >= 0; --row) {
+        if (std::abs(response(row, o) - end) <= 0.02 * std::abs(end)) continue;
+        if (std::abs(end) > 0.0) settled = std::max(settled, row + 1);
+        break;
       }
-      // The variance of the estimate is P / rows, P = sum over all lags of the product of both autocorrelations.
-      double spread = 1.0;
-      for (Eigen::Index k = 1; k <= 4 * correlated_lags; ++k) {
-        spread += 2.0 * sum_of_correlations(errors, errors, k) / error_power * sum_of_correlations(input, input, k) /
-                  input_power;
-      }
-      tests.cross_correlation_bound(i) = quantile_of_99_per_cent * std::sqrt(std::max(spread, 1.0) / run_rows);
     }
-    all.push_back(std::move(tests));
   }
-  return all;
+  return settled;
 }
 
 }  // namespace llmt

@@ -15,21 +15,21 @@ namespace {
 constexpr const char* stable = "stable";
 constexpr const char* unstable = "unstable";
 constexpr const char* goes_on = "polynomial";
-constexpr const char* held = "linear";
-constexpr const char* change = "change";
-constexpr const char* value = "value";
+constexpr const char* goes_on_held = "linear";
+constexpr const char* predicted_change = "change";
+constexpr const char* predicted_value = "value";
 
 Json json_of(const Signal& signal, const std::vector<int>& lags, bool adds_up = false) {
   Json json = {
       {"name", signal.name}, {"unit", signal.unit}, {"low", signal.low}, {"high", signal.high}, {"lags", lags}};
-  if (adds_up) json["predicted"] = change;
+  if (adds_up) json["predicted"] = predicted_change;
   if (std::isfinite(signal.lower_stop)) json["lower_stop"] = signal.lower_stop;
   if (std::isfinite(signal.upper_stop)) json["upper_stop"] = signal.upper_stop;
   return json;
 }
 
 Json json_of(const Polynomial& polynomial, const std::vector<std::string>& names) {
-  Json json = {{"beyond_range", polynomial.is_held ? held : goes_on}};
+  Json json = {{"beyond_range", polynomial.is_held ? goes_on_held : goes_on}};
   json["regressors"] = Json::array();
   for (Eigen::Index j = 0; j < polynomial.centre.size(); ++j) {
     json["regressors"].push_back({{"name", names[j]},
@@ -76,7 +76,7 @@ Signal signal_from(const JsonReader& json, bool is_output, std::vector<std::vect
 
 Polynomial polynomial_from(const JsonReader& json, Eigen::Index outputs) {
   Polynomial polynomial;
-  polynomial.is_held = is_first(json.member("beyond_range"), held, goes_on);
+  polynomial.is_held = is_first(json.member("beyond_range"), goes_on_held, goes_on);
   const std::vector<JsonReader> regressors = json.member("regressors").elements();
   for (Eigen::VectorXd* values : {&polynomial.centre, &polynomial.scale, &polynomial.low, &polynomial.high}) {
     values->resize(std::ssize(regressors));
@@ -94,6 +94,28 @@ Polynomial polynomial_from(const JsonReader& json, Eigen::Index outputs) {
     polynomial.coefficients.col(k) = terms[k].member("coefficients").vector(outputs);
   }
   return polynomial;
+}
+
+Json json_of(const RunBand& band) {
+  Json json = {{"longest", band.longest}, {"outputs", Json::array()}};
+  for (const std::vector<HeldOutErrors>& lists : band.outputs) {
+    Json of_output = Json::array();
+    for (const HeldOutErrors& list : lists) of_output.push_back({{"rows", list.rows}, {"errors", list.errors}});
+    json["outputs"].push_back(std::move(of_output));
+  }
+  return json;
+}
+
+RunBand band_from(const JsonReader& json) {
+  RunBand band;
+  band.longest = json.member("longest").as<Eigen::Index>();
+  for (const JsonReader& of_output : json.member("outputs").elements()) {
+    std::vector<HeldOutErrors>& lists = band.outputs.emplace_back();
+    for (const JsonReader& list : of_output.elements()) {
+      lists.push_back({list.member("rows").as<double>(), list.member("errors").list<double>()});
+    }
+  }
+  return band;
 }
 
 DynamicModel dynamic_from(const JsonReader& root) {
@@ -114,11 +136,12 @@ DynamicModel dynamic_from(const JsonReader& root) {
   }
   for (const JsonReader& output : root.member("outputs").elements()) {
     parts.outputs.push_back(signal_from(output, true, parts.lags.outputs));
-    if (!output.has("predicted") || !is_first(output.member("predicted"), change, value)) continue;
+    if (!output.has("predicted") || !is_first(output.member("predicted"), predicted_change, predicted_value)) continue;
     parts.lags.adds_up.resize(root.member("outputs").elements().size());
     parts.lags.adds_up[parts.outputs.size() - 1] = true;
   }
   parts.polynomial = polynomial_from(root.member("polynomial"), std::ssize(parts.outputs));
+  if (root.has("held_out_errors")) parts.band = band_from(root.member("held_out_errors"));
   if (root.has("tree") && root.has("sum")) root.fail("a model has a tree or a sum of trees, not both");
   if (root.has("tree")) parts.rest = model_from(root.member("tree"));
   if (root.has("sum")) parts.rest = boosted_model_from(root.member("sum"));
@@ -151,6 +174,7 @@ std::string to_json(const DynamicModel& model) {
       json_of(parts.polynomial, column_names(model.columns(), names_in(parts.inputs), names_in(parts.outputs)));
   if (const auto* tree = std::get_if<Model>(&parts.rest)) json["tree"] = json_of(*tree);
   if (const auto* sum = std::get_if<BoostedModel>(&parts.rest)) json["sum"] = json_of(*sum);
+  if (!parts.band.outputs.empty()) json["held_out_errors"] = json_of(parts.band);
   return model_text(json);
 }
 

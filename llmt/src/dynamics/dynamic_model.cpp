@@ -51,6 +51,27 @@ void check_polynomial(const Polynomial& polynomial, Eigen::Index regressors, Eig
   }
 }
 
+void check_band(const RunBand& band, Eigen::Index outputs) {
+  if (band.outputs.empty()) return;
+  if (std::ssize(band.outputs) != outputs) {
+    refuse(fmt::format("errors of held-out runs are given of {} outputs, there are {}", band.outputs.size(), outputs));
+  }
+  if (band.longest < 1) refuse(fmt::format("the longest held-out run has {} rows", band.longest));
+  for (const std::vector<HeldOutErrors>& lists : band.outputs) {
+    if (lists.empty()) refuse("an output has no errors of held-out runs, and another one has");
+    double rows = 0.0;
+    for (const HeldOutErrors& list : lists) {
+      if (!(list.rows > rows) || !std::isfinite(list.rows)) refuse("errors of held-out runs do not ascend in rows");
+      rows = list.rows;
+      double error = 0.0;
+      for (const double next : list.errors) {
+        if (!(next >= error) || !std::isfinite(next)) refuse("errors of held-out runs are not finite and ascending");
+        error = next;
+      }
+    }
+  }
+}
+
 template <class AnyModel>
 void check_rest(const AnyModel& rest, Eigen::Index regressors, Eigen::Index outputs) {
   if (rest.num_inputs() != regressors || rest.num_outputs() != outputs) {
@@ -78,6 +99,7 @@ DynamicModel::DynamicModel(DynamicParts parts) : parts_(std::move(parts)) {
   check_lags(parts_.lags);
   columns_ = columns_of(parts_.lags);
   memory_ = longest_lag(parts_.lags);
+  check_band(parts_.band, num_outputs());
   const Eigen::Index regressors = std::ssize(columns_);
   check_polynomial(parts_.polynomial, regressors, num_outputs());
   if (const auto* tree = std::get_if<Model>(&parts_.rest)) check_rest(*tree, regressors, num_outputs());

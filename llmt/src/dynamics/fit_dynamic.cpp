@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "dynamics/choice.hpp"
+#include "dynamics/held_out_runs.hpp"
 #include "dynamics/model_structure.hpp"
 #include "dynamics/windows.hpp"
 
@@ -28,6 +29,18 @@ RunErrors errors_of(const Judged& judged, const Eigen::VectorXd& scale) {
 std::string continuation_of(const ModelStructure& candidate) {
   if (candidate.degree == 0) return "guarded";
   return candidate.degree > 1 && !candidate.is_held ? "polynomial" : "linear";
+}
+
+// The stretches over which the chosen model was judged; the first `count` of them hold out every row once.
+std::vector<StretchFold> folds_of(const std::vector<Stretch>& stretches, Eigen::Index rows, Eigen::Index& count) {
+  if (rows > search_rows) {
+    count = 3;
+    return {every_third(stretches, 9, 2), every_third(stretches, 9, 0), every_third(stretches, 9, 1)};
+  }
+  std::vector<StretchFold> folds = cut(stretches, 4);
+  count = std::ssize(folds);
+  for (StretchFold& fold : cut(stretches, 7)) folds.push_back(std::move(fold));
+  return folds;
 }
 
 DynamicCandidate compared(const Task& task, const Trial& trial) {
@@ -56,7 +69,27 @@ DynamicFit fit_dynamic(const Series& series, const DynamicOptions& options, cons
   if (options.horizon < 0) {
     throw std::invalid_argument(fmt::format("llmt::fit_dynamic: the horizon is {}, it is 0 or more", options.horizon));
   }
-  const Eigen::Index memory = options.lags ? longest_lag(*options.lags) : 0;
+  if (!options.delays.empty() && std::ssize(options.delays) != series.inputs.cols()) {
+    throw std::invalid_argument("llmt::fit_dynamic: a delay is needed for each input of the series");
+  }
+  for (const int delay : options.delays) {
+    if (delay != find_delay && (delay < 0 || delay > most_lag)) {
+      throw std::invalid_argument(
+          fmt::format("llmt::fit_dynamic: a delay is {}, it is find_delay or 0 to {}", delay, most_lag));
+    }
+  }
+  Eigen::Index memory = 0;
+  if (options.lags) {
+    Lags lags = *options.lags;
+    std::vector<int> given = options.delays;
+    given.resize(lags.inputs.size(), 0);
+    for (int& delay : given) delay = std::max(delay, 0);
+    lags = delayed(std::move(lags), given);
+    check_lags(lags);
+    memory = longest_lag(lags);
+  } else {
+    for (const int delay : options.delays) memory = std::max<Eigen::Index>(memory, delay);
+  }
   const std::vector<Stretch> stretches = complete_stretches(series, memory + 2);
   Eigen::Index rows = 0;
   for (const Stretch& stretch : stretches) rows += stretch.rows();
@@ -89,11 +122,18 @@ DynamicFit fit_dynamic(const Series& series, const DynamicOptions& options, cons
   }
   const Trial& best = chosen.trials[taken];
   parts.is_stable = best.judged.diverged == 0 && training.diverged == 0;
-  DynamicFit fit{DynamicModel(std::move(parts)), {}, {}};
+  Eigen::Index whole = 0;
+  const std::vector<StretchFold> folds = folds_of(stretches, rows, whole);
+  const int iterations = rows > search_rows ? final_iterations : search_iterations;
+  Work running(work, 0.5 * work.left());
+  HeldOutRuns held_out = held_out_runs(task, best.candidate, folds, whole, iterations, running);
+  parts.band = std::move(held_out.band);
+  DynamicFit fit{DynamicModel(std::move(parts)), {}, {}, std::move(held_out.simulated)};
   DynamicSummary& summary = fit.summary;
   summary.rows = rows;
   for (const Trial& trial : chosen.trials) summary.compared.push_back(compared(task, trial));
   summary.chosen = taken;
+  summary.delays = chosen.delays;
   summary.continuation = continuation_of(best.candidate);
   summary.held_out = errors_of(best.judged, task.scale);
   for (const Trial& trial : chosen.trials) {

@@ -78,6 +78,41 @@ Lags parse_lags(std::string_view text, const std::vector<std::string>& inputs,
   return lags;
 }
 
+std::vector<int> parse_delays(std::string_view text, const std::vector<std::string>& inputs, int otherwise) {
+  std::vector<int> delays(inputs.size(), otherwise);
+  std::vector<bool> named(inputs.size(), false);
+  const auto refuse = [](std::string_view part, const std::string& why) {
+    throw std::invalid_argument(fmt::format("delay: \"{}\": {}", part, why));
+  };
+  std::string_view rest = text;
+  while (true) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view part = rest.substr(0, comma);
+    const std::size_t colon = part.rfind(':');
+    const std::string_view number = colon == std::string_view::npos ? std::string_view() : part.substr(colon + 1);
+    int delay = -1;
+    const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), delay);
+    if (error != std::errc() || end != number.data() + number.size() || delay < 0 || delay > most_lag) {
+      refuse(part, fmt::format("auto, or INPUT:ROWS with 0 to {} rows is needed, such as u:3", most_lag));
+    }
+    const auto input = std::ranges::find(inputs, part.substr(0, colon));
+    if (input == inputs.end()) refuse(part, "there is no such input");
+    const auto place = static_cast<std::size_t>(input - inputs.begin());
+    if (named[place]) refuse(part, "the input has a delay already");
+    named[place] = true;
+    delays[place] = delay;
+    if (comma == std::string_view::npos) return delays;
+    rest = rest.substr(comma + 1);
+  }
+}
+
+Lags delayed(Lags lags, const std::vector<int>& delays) {
+  for (std::size_t i = 0; i < lags.inputs.size(); ++i) {
+    for (int& lag : lags.inputs[i]) lag += delays[i];
+  }
+  return lags;
+}
+
 std::string text_of(const Lags& lags, const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
   std::string text;
   for (std::size_t o = 0; o < lags.outputs.size(); ++o)

@@ -43,11 +43,11 @@ std::vector<StretchFold> cut(const std::vector<Stretch>& stretches, Eigen::Index
   return folds;
 }
 
-StretchFold every_third(const std::vector<Stretch>& stretches, Eigen::Index count) {
+StretchFold every_third(const std::vector<Stretch>& stretches, Eigen::Index count, Eigen::Index first) {
   const Eigen::Index rows = rows_of(stretches);
   StretchFold fold;
   for (Eigen::Index k = 0; k < count; ++k) {
-    append(k % 3 == 2 ? fold.held_out : fold.train, part(stretches, rows * k / count, rows * (k + 1) / count));
+    append(k % 3 == first ? fold.held_out : fold.train, part(stretches, rows * k / count, rows * (k + 1) / count));
   }
   return fold;
 }

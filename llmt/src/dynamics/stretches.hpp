@@ -16,8 +16,8 @@ struct StretchFold {
 /// Cuts the rows of the stretches, one behind the other, into `count` parts of equal length; each is held out once.
 std::vector<StretchFold> cut(const std::vector<Stretch>& stretches, Eigen::Index count);
 
-/// One fold that holds out the parts 2, 5, 8, ... of `count`, counted from 0, together.
-StretchFold every_third(const std::vector<Stretch>& stretches, Eigen::Index count);
+/// One fold that holds out the parts first, first + 3, first + 6, ... of `count`, counted from 0, together.
+StretchFold every_third(const std::vector<Stretch>& stretches, Eigen::Index count, Eigen::Index first = 2);
 
 /// At most `rows` rows, in `count` parts of equal length at equal distances.
 std::vector<Stretch> thinned(const std::vector<Stretch>& stretches, Eigen::Index rows, Eigen::Index count);

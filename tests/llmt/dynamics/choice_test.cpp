@@ -103,6 +103,44 @@ TEST(DynamicChoice, OutputsAreInputsOfEachOther) {
   EXPECT_LT((local.steady_gain - gain).norm(), 1e-8);
 }
 
+// y(t) = 0.8 y(t-1) + 0.5 u(t-8): a dead time of seven rows before the one of the model.
+TEST(DynamicChoice, ADeadTimeIsFoundOrGiven) {
+  Series series = systems::record(400, 15, systems::oscillator, 0.0);
+  llmt::Random random(16);
+  for (Eigen::Index row = 0; row < 400; ++row) {
+    const double before = row > 0 ? series.outputs(row - 1, 0) : 0.0;
+    series.outputs(row, 0) = 0.8 * before + (row >= 8 ? 0.5 * series.inputs(row - 8, 0) : 0.0) + 0.01 * random.normal();
+  }
+  llmt::DynamicOptions options;
+  options.rest = llmt::RestLearner::none;
+  options.lags = llmt::Lags{{{1}}, {{1}}};
+  options.delays = {llmt::find_delay};
+  const llmt::DynamicFit found = llmt::fit_dynamic(series, options);
+  EXPECT_EQ(found.summary.delays, std::vector<int>{7});
+  EXPECT_EQ(found.model.parts().lags.inputs[0], std::vector<int>{8});
+  options.delays = {7};
+  EXPECT_EQ(llmt::to_json(llmt::fit_dynamic(series, options).model), llmt::to_json(found.model));
+  options.delays = {6};
+  EXPECT_GT(llmt::fit_dynamic(series, options).summary.held_out.rmse(0), 3.0 * found.summary.held_out.rmse(0));
+  // Lags that are chosen begin there too.
+  options.lags.reset();
+  options.delays = {8};
+  const llmt::DynamicFit chosen = llmt::fit_dynamic(series, options);
+  EXPECT_EQ(chosen.model.parts().lags.inputs[0].front(), 8);
+  options.delays = {1, 2};
+  EXPECT_THROW(llmt::fit_dynamic(series, options), std::invalid_argument);
+  options.delays = {-2};
+  EXPECT_THROW(llmt::fit_dynamic(series, options), std::invalid_argument);
+}
+
+TEST(DynamicChoice, DeadTimesAreReadWithTheirInputs) {
+  EXPECT_EQ(llmt::parse_delays("v:3", {"u", "v"}, llmt::find_delay), (std::vector<int>{-1, 3}));
+  EXPECT_EQ(llmt::parse_delays("v:3,u:0", {"u", "v"}, 9), (std::vector<int>{0, 3}));
+  for (const char* wrong : {"", "u", "u:", "u:-1", "u:x", "w:1", "u:1,u:2", "u:1.5", "u:99999"}) {
+    EXPECT_THROW(llmt::parse_delays(wrong, {"u", "v"}, 0), std::invalid_argument) << wrong;
+  }
+}
+
 TEST(DynamicChoice, ASpringThatStiffensIsFoundBeyondALinearModel) {
   const Series series = systems::record(800, 11, systems::duffing, 0.02, 3.0);
   llmt::DynamicOptions options;
