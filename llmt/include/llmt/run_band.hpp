@@ -16,9 +16,9 @@ namespace llmt {
 
 /// Half the width of the band of an output `rows` rows (1, 2, ...) after the last measured one: the smallest error that
 /// is as large as ceil(level (n + 1)) of the n held-out ones there. Between the rows of two lists it follows a straight
-/// line, and it never falls with the rows. Beyond the last list it stays, or, of an output that adds up its changes,
-/// goes on in proportion to the rows. Throws std::invalid_argument if the model has no held-out errors, there is no
-/// such output, the level is not between 0 and 1, or there are too few errors for it.
+/// line. Beyond the last list it stays, or, of an output that adds up its changes, goes on in proportion to the rows.
+/// Throws std::invalid_argument if the model has no held-out errors, there is no such output, the level is not between
+/// 0 and 1, or there are too few errors for it.
 double half_width(const DynamicModel& model, Eigen::Index output, double rows, double level);
 
 /// The band of a run, rows x outputs: the simulated output plus and minus half_width(), within the stops of the output.

@@ -12,7 +12,7 @@ namespace {
 constexpr Eigen::Index beginnings = 16;
 constexpr std::size_t fewest_errors = 20;
 constexpr std::size_t most_errors = 200;
-// Errors that grow by less than this from one list to the next are pooled.
+// Errors that differ by less than this from one list to the next are pooled.
 constexpr double growth = 1.1;
 
 // Errors of an output after 1, 2 or 3, 4 to 7, 8 to 15, ... rows.
@@ -70,17 +70,27 @@ RunsOfFold runs_of(const Task& task, const DynamicParts& parts, const std::vecto
   return runs;
 }
 
-// Neighbours are pooled until each list has enough errors and they grow from list to list.
+// Whether errors fall from list to list up to the one behind `last`: the noise of the rows that a run begins with dies
+// away.
+bool falls_up_to(const std::vector<Pool>& pools, std::size_t last) {
+  for (std::size_t k = 0; k <= last; ++k) {
+    if (!(growth * growth * pools[k + 1].mean_square() < pools[k].mean_square())) return false;
+  }
+  return true;
+}
+
+// Neighbours are pooled until each list has enough errors and they fall at first, if at all, and then grow.
 void pool(std::vector<Pool>& pools) {
   for (std::size_t k = 0; k + 1 < pools.size();) {
     const bool is_few = pools[k].errors.size() < fewest_errors || pools[k + 1].errors.size() < fewest_errors;
-    if (is_few || pools[k + 1].mean_square() < growth * growth * pools[k].mean_square()) {
-      pools[k] += pools[k + 1];
-      pools.erase(pools.begin() + static_cast<std::ptrdiff_t>(k) + 1);
-      k = k > 0 ? k - 1 : 0;
-    } else {
+    const bool grows = pools[k + 1].mean_square() >= growth * growth * pools[k].mean_square();
+    if (!is_few && (grows || falls_up_to(pools, k))) {
       ++k;
+      continue;
     }
+    pools[k] += pools[k + 1];
+    pools.erase(pools.begin() + static_cast<std::ptrdiff_t>(k) + 1);
+    k = k > 0 ? k - 1 : 0;
   }
 }
 

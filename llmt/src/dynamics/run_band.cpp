@@ -22,7 +22,7 @@ double quantile_of(const std::vector<double>& errors, double level) {
   return errors[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
 }
 
-// The band of an output: half its width, never falling, at some numbers of rows.
+// The band of an output: half its width at some numbers of rows.
 struct Widths {
   std::vector<double> rows;
   std::vector<double> widths;
@@ -50,9 +50,8 @@ Widths widths_of(const DynamicModel& model, Eigen::Index output, double level) {
   }
   Widths result{{}, {}, adds_up(parts.lags, output)};
   for (const HeldOutErrors& part : parts.band.outputs[output]) {
-    const double width = quantile_of(part.errors, level);
     result.rows.push_back(part.rows);
-    result.widths.push_back(result.widths.empty() ? width : std::max(result.widths.back(), width));
+    result.widths.push_back(quantile_of(part.errors, level));
   }
   return result;
 }

@@ -47,9 +47,6 @@ TEST(RunBand, IsARankOfTheErrorsAndALineBetweenThem) {
   EXPECT_EQ(llmt::half_width(model, 0, 500.0, 0.9), 36.0);
   const llmt::DynamicModel grows(first_order(band, true));
   EXPECT_DOUBLE_EQ(llmt::half_width(grows, 0, 22.0, 0.9), 72.0);
-  // It never falls.
-  const llmt::DynamicModel falls(first_order({{{{1.0, up_to(19)}, {11.0, up_to(19, 0.5)}}}, 20}));
-  EXPECT_EQ(llmt::half_width(falls, 0, 11.0, 0.9), 18.0);
   EXPECT_THROW(llmt::half_width(model, 0, 1.0, 0.99), std::invalid_argument);
   EXPECT_THROW(llmt::half_width(model, 1, 1.0, 0.9), std::invalid_argument);
   EXPECT_THROW(llmt::half_width(model, 0, 1.0, 1.0), std::invalid_argument);
@@ -104,7 +101,7 @@ TEST(RunBand, HoldsNineOfTenMeasuredValuesOfFreshRuns) {
   const llmt::DynamicFit linear = llmt::fit_dynamic(systems::record(500, 31, systems::oscillator, 0.1), options);
   const Coverage of_linear = coverage_of(linear.model, systems::oscillator, 400, 0.1, 1.0);
   EXPECT_NEAR(of_linear.all, 0.9, 0.04);
-  EXPECT_NEAR(of_linear.early, 0.9, 0.08);
+  EXPECT_NEAR(of_linear.early, 0.9, 0.05);
   options.rest = llmt::RestLearner::none;
   const llmt::DynamicFit spring = llmt::fit_dynamic(systems::record(500, 32, systems::duffing, 0.1, 3.0), options);
   const Coverage of_spring = coverage_of(spring.model, systems::duffing, 400, 0.1, 3.0);
