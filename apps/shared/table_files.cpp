@@ -138,7 +138,7 @@ Eigen::MatrixXd TableFiles::read(Eigen::Index first, Eigen::Index count, const s
   return rows;
 }
 
-std::vector<std::string> TableFiles::words_of(const std::string& column, std::size_t most) const {
+TableFiles::DifferentWords TableFiles::different_words(const std::string& column, std::size_t most) const {
   std::set<std::string> words;
   for (const File& file : files_) {
     for (Eigen::Index first = 0; first < file.table.rows(); first += arrow_rows_at_once(1)) {
@@ -146,9 +146,7 @@ std::vector<std::string> TableFiles::words_of(const std::string& column, std::si
       for (std::string& word : file.table.texts(first, count, column)) {
         if (!word.empty()) words.insert(std::move(word));
       }
-      if (words.size() <= most) continue;
-      throw std::runtime_error(fmt::format("{}: column \"{}\" has more than {} different words; --ignore leaves it out",
-                                           file.path, column, most));
+      if (words.size() > most) return {{words.begin(), words.end()}, false};
     }
   }
   for (const std::string& word : words) {
@@ -158,14 +156,14 @@ std::vector<std::string> TableFiles::words_of(const std::string& column, std::si
       throw std::runtime_error(fmt::format("{}: column \"{}\" has words that are not UTF-8", name(), column));
     }
   }
-  return {words.begin(), words.end()};
+  return {{words.begin(), words.end()}, true};
 }
 
 std::vector<std::vector<std::string>> TableFiles::levels(const std::vector<std::string>& columns,
                                                          std::size_t most) const {
   std::vector<std::vector<std::string>> levels(columns.size());
   for (std::size_t k = 0; k < columns.size(); ++k) {
-    const bool is_text = files_.front().table.has_text(columns[k]);
+    const bool is_text = has_text(columns[k]);
     for (const File& file : files_) {
       if (file.table.has_text(columns[k]) == is_text) continue;
       throw std::runtime_error(fmt::format("{}: column \"{}\" holds {}, and {} in {}", file.path, columns[k],
@@ -176,7 +174,12 @@ std::vector<std::vector<std::string>> TableFiles::levels(const std::vector<std::
       require_numbers({columns[k]});
       continue;
     }
-    levels[k] = words_of(columns[k], most);
+    DifferentWords found = different_words(columns[k], most);
+    if (!found.are_all) {
+      throw std::runtime_error(fmt::format("{}: column \"{}\" has more than {} different words; --ignore leaves it out",
+                                           name(), columns[k], most));
+    }
+    levels[k] = std::move(found.words);
     if (levels[k].empty()) levels[k] = {"(none)"};  // as of a column of a CSV file
   }
   return levels;

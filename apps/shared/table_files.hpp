@@ -73,6 +73,16 @@ class TableFiles {
   /// Throws std::runtime_error naming file and column if a column with levels holds numbers, or one without holds none.
   void check_kinds(const std::vector<std::string>& columns, const std::vector<std::vector<std::string>>& levels) const;
 
+  /// Whether a column holds text or dates in the first file.
+  bool has_text(const std::string& column) const { return files_.front().table.has_text(column); }
+
+  /// The different words of a column of text, sorted, without the empty one.
+  struct DifferentWords {
+    std::vector<std::string> words;
+    bool are_all = true;  ///< else there are more than were asked for, and some of them are in `words`
+  };
+  DifferentWords different_words(const std::string& column, std::size_t most) const;
+
   /// The different words of each column, sorted, without the empty one, which is a missing value; none for numbers.
   /// Reads all rows of columns of text. Throws std::runtime_error naming file and column: one that has text in some
   /// files and numbers in others, words that are not UTF-8, or more than `most` different ones.
@@ -90,8 +100,6 @@ class TableFiles {
   };
 
   const File& file_of(Eigen::Index row) const;
-  std::vector<std::string> words_of(const std::string& column, std::size_t most) const;
-
   std::vector<File> files_;
   Eigen::Index rows_ = 0;
 };

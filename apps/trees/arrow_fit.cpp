@@ -17,6 +17,7 @@
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 #include "shared/table_files.hpp"
+#include "trees/accidental.hpp"
 #include "trees/arrow_learning.hpp"
 
 namespace llmt::apps {
@@ -192,7 +193,11 @@ void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& argumen
                                             table.name(), csv_row(table.columns())));
   }
   PassColumns columns;
+  const bool is_first = processes.rank() == 0;
   columns.names = choose_inputs(table.columns(), table.name(), learning);
+  constexpr std::size_t most_words = 255;  // distributed::Options::levels
+  if (is_first) columns.names = without_accidental_words(learning, std::move(columns.names), table, most_words);
+  columns.names = Json::parse(processes.of_first(Json(columns.names).dump())).get<std::vector<std::string>>();
   columns.inputs = std::ssize(columns.names);
   columns.names.push_back(learning.targets.front());
   distributed::Options options{
@@ -203,8 +208,6 @@ void arrow_fit_command(const CLI::App& command, const ArrowFitArguments& argumen
   options.branch_rows = branch_rows_of(arguments, columns.names.size());
   options.sample_rows =
       std::min(options.sample_rows, std::max<Eigen::Index>(options.branch_rows / part_for_sample, 100));
-  const bool is_first = processes.rank() == 0;
-  constexpr std::size_t most_words = 255;  // distributed::Options::levels
   if (is_first) {
     options.levels = table.levels(inputs, most_words);
     set_columns(learning.columns, inputs, options.levels, options.fit);

@@ -4,12 +4,14 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
 
 #include "shared/options.hpp"
+#include "trees/accidental.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -23,7 +25,7 @@ TrainingData read_into_memory(const TableFiles& table, const LearningArguments& 
   columns.insert(columns.end(), arguments.targets.begin(), arguments.targets.end());
   if (!arguments.weight.empty()) columns.push_back(arguments.weight);
   table.require_numbers({columns.begin() + inputs, columns.end()});
-  data.levels = table.levels(data.input_names, most_categories);
+  data.levels = table.levels(data.input_names, std::numeric_limits<std::size_t>::max());
   constexpr double part_of_memory = 0.05;  // fits on several threads hold some ten times the table
   const double bytes = 8.0 * static_cast<double>(table.rows()) * static_cast<double>(columns.size());
   const double most = part_of_memory * static_cast<double>(physical_memory());
@@ -35,7 +37,19 @@ TrainingData read_into_memory(const TableFiles& table, const LearningArguments& 
   }
   const Eigen::MatrixXd rows = table.read(0, table.rows(), columns, data.levels);
   check_rows(table, columns, inputs, rows, 0);
-  data.inputs = rows.leftCols(inputs);
+  report::InputColumns read{.values = rows.leftCols(inputs), .levels = std::move(data.levels), .categorical = {}};
+  for (int column = 0; column < inputs; ++column) {
+    if (!read.levels[column].empty()) read.categorical.push_back(column);
+  }
+  leave_out_accidental(arguments, data.input_names, read);
+  for (std::size_t k = 0; k < read.levels.size(); ++k) {
+    if (std::cmp_greater(read.levels[k].size(), most_categories)) {
+      throw std::runtime_error(fmt::format("{}: column \"{}\" has more than {} different words; --ignore leaves it out",
+                                           table.name(), data.input_names[k], most_categories));
+    }
+  }
+  data.inputs = std::move(read.values);
+  data.levels = std::move(read.levels);
   data.outputs = rows.middleCols(inputs, std::ssize(arguments.targets));
   if (!arguments.weight.empty()) data.weights = rows.rightCols(1);
   if (!arguments.groups.empty()) {

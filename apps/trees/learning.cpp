@@ -12,11 +12,11 @@
 
 #include "llmt/arrow.hpp"
 #include "llmt/csv.hpp"
-#include "report/table/named_inputs.hpp"
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
 #include "shared/options.hpp"
 #include "shared/table_file.hpp"
+#include "trees/accidental.hpp"
 #include "trees/arrow_learning.hpp"
 
 namespace llmt::apps {
@@ -83,82 +83,6 @@ void say_what_is_taken_as_missing(const std::vector<std::string>& names, const r
                      cells.count, cells.count == 1 ? "" : "s", cells.text, names[cells.column],
                      cells.count == 1 ? "is" : "are", is_alone ? "; other columns have none" : "", names[cells.column],
                      cells.text));
-  }
-}
-
-// Whether an option of a column names an input, --monotone for example, perhaps with a sign.
-bool is_named(const LearningArguments& arguments, const std::string& name) {
-  return std::ranges::any_of(arguments.columns, [&](const auto& option) {
-    return contains(option.second, name) || contains(option.second, "-" + name);
-  });
-}
-
-// Says which columns are inputs although they look like names or numbers of the rows, or as if some of their numbers
-// were none. Returns those that are left out. Nothing is said of inputs that were asked for.
-std::vector<int> look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
-                                            const report::InputColumns& inputs) {
-  std::vector<int> left_out;
-  if (!arguments.inputs.empty()) return left_out;
-  for (const report::AccidentalInput& found : report::accidental_inputs(inputs)) {
-    const std::string& name = names[found.input];
-    if (found.kind == report::AccidentalInput::Kind::row_numbers) {
-      warn(fmt::format("llmt: column \"{}\" numbers the rows and is an input; --ignore leaves it out", name));
-      continue;
-    }
-    if (contains(arguments.categorical, name)) continue;
-    if (found.kind == report::AccidentalInput::Kind::far_value) {
-      warn(fmt::format("llmt: column \"{}\": {}; if they stand for missing values, empty these cells", name,
-                       found.detail));
-      continue;
-    }
-    if (found.kind == report::AccidentalInput::Kind::unit) {
-      warn(fmt::format(
-          "llmt: column \"{}\": every cell is {}, and is taken for categories; write the numbers alone to have "
-          "numbers, --categorical says that categories are meant",
-          name, found.detail));
-      continue;
-    }
-    if (found.is_left_out && !is_named(arguments, name)) {
-      warn(
-          fmt::format("llmt: column \"{}\" has {}, {} different ones in {} rows, and is left out; {}--categorical "
-                      "takes it for categories",
-                      name, found.kind == report::AccidentalInput::Kind::dates ? "dates" : "words",
-                      inputs.levels[found.input].size(), inputs.values.rows(),
-                      found.kind == report::AccidentalInput::Kind::dates ? "give a number, as days; " : ""));
-      left_out.push_back(found.input);
-      continue;
-    }
-    const std::string advice =
-        found.kind == report::AccidentalInput::Kind::dates
-            ? fmt::format(
-                  "it looks like a date: leave it out (--ignore {}) or give a number, as days; --categorical says that "
-                  "categories are meant",
-                  name)
-            : "--ignore leaves it out, --categorical says that it is meant";
-    warn(fmt::format("llmt: column \"{}\" has words, {} different ones in {} rows, and is taken for categories; {}",
-                     name, inputs.levels[found.input].size(), inputs.values.rows(), advice));
-  }
-  std::ranges::sort(left_out);
-  return left_out;
-}
-
-// Takes columns away. One input stays at least.
-void leave_out(const std::vector<int>& columns, std::vector<std::string>& names, report::InputColumns& inputs) {
-  if (columns.empty() || columns.size() == names.size()) return;
-  std::vector<int> kept;
-  for (int column = 0; column < static_cast<int>(names.size()); ++column) {
-    if (!std::ranges::binary_search(columns, column)) kept.push_back(column);
-  }
-  inputs.values = inputs.values(Eigen::all, kept).eval();
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    names[k] = names[static_cast<std::size_t>(kept[k])];
-    inputs.levels[k] = inputs.levels[static_cast<std::size_t>(kept[k])];
-  }
-  names.resize(kept.size());
-  inputs.levels.resize(kept.size());
-  inputs.categorical.clear();
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    if (!inputs.levels[k].empty()) inputs.categorical.push_back(static_cast<int>(k));
   }
 }
 
@@ -265,7 +189,11 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
                                     largest_input, arguments.options.max_threads);
   look_for_dominant_rows(csv, arguments, columns);
   say_what_is_taken_as_missing(inputs, columns.inputs);
-  leave_out(look_for_accidental_inputs(arguments, inputs, columns.inputs), inputs, columns.inputs);
+  leave_out_accidental(arguments, inputs, columns.inputs);
+  for (const report::ManyWords& many : columns.inputs.beyond_limit) {
+    csv.refuse(many.row, inputs[many.column],
+               fmt::format("more than {} categories{}", most_categories, advice.leave_out));
+  }
   look_for_nothing_to_learn(csv, arguments, columns);
   LearningTable table{nullptr, arguments.options, lines_of_rows(csv)};
   FitOptions& options = table.options;

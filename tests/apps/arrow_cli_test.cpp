@@ -11,6 +11,7 @@
 #include "llmt/arrow.hpp"
 #include "llmt/files.hpp"
 #include "llmt/random.hpp"
+#include "oracles/arrow_files.hpp"
 #include "oracles/state_files.hpp"
 
 namespace {
@@ -41,6 +42,29 @@ TEST(ArrowProgram, AFileThatIsNotThereIsSaidBeforeItsOptions) {
     expect_refusal(folder.run(fmt::format("{} fit nowhere.arrow -t y {}", llmt_program, option)), 1,
                    "nowhere.arrow: cannot be read: No such file or directory");
   }
+}
+
+TEST(ArrowProgram, DatesAreLeftOutAsThoseOfTextAre) {
+  const Folder folder;
+  folder.write("d.arrow", arrow_files::dated_rows());
+  const std::string said =
+      "llmt: column \"when\" has dates, 24 different ones in 24 rows, and is left out; give a number, as days; "
+      "--inputs "
+      "takes it for categories\n";
+  const Outcome fitted = folder.run(llmt_program + " fit d.arrow -t y -o m.json");
+  EXPECT_EQ(fitted.exit_code, 0);
+  EXPECT_EQ(fitted.err, said);
+  const Outcome ignored = folder.run(llmt_program + " fit d.arrow -t y --ignore when -o plain.json");
+  EXPECT_EQ(ignored.err, "");
+  EXPECT_EQ(llmt::read_file(folder.file("m.json")), llmt::read_file(folder.file("plain.json")));
+  EXPECT_EQ(folder.run(llmt_program + " predict m.json d.arrow -o p.csv").exit_code, 0);
+  const Outcome compared = folder.run(llmt_program + " compare d.arrow -t y");
+  EXPECT_EQ(compared.exit_code, 0);
+  EXPECT_EQ(compared.err, said);
+  const Outcome asked = folder.run(llmt_program + " fit d.arrow -t y --inputs when,x -o c.json");
+  EXPECT_EQ(asked.err, "");
+  EXPECT_NE(llmt::read_file(folder.file("c.json")).find("2024-02-29"), std::string::npos);
+  expect_refusal(folder.run(llmt_program + " fit d.arrow -t when"), 1, "column \"when\" holds no numbers");
 }
 
 TEST(ArrowProgram, TablesOfOtherFormatsAreNamed) {

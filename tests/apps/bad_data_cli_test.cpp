@@ -113,9 +113,54 @@ TEST(BadData, WeightsThatAreAllZeroAreNamed) {
 TEST(BadData, TooManyCategoriesAreNamed) {
   const Folder folder;
   std::string text = "word,x,y\n";
-  for (int i = 0; i <= 10000; ++i) text += fmt::format("w{},{},{}\n", i, i % 5, i % 3);
+  for (int i = 0; i <= 20001; ++i) text += fmt::format("w{},{},{}\n", i % 10001, i % 5, i % 3);
   EXPECT_EQ(refusal_of(folder, text, "fit d.csv -t y"),
             "llmt: d.csv:10002: column \"word\": more than 10000 categories (--ignore COLUMN leaves a column out)\n");
+}
+
+// Words that differ in most rows, and dates of many days, are left out however many they are, unless they were asked
+// for.
+TEST(BadData, WordsOfEveryRowAreLeftOutHoweverManyTheyAre) {
+  const Folder folder;
+  std::string text = "word,when,x,y\n";
+  std::string plain = "x,y\n";
+  for (int i = 0; i < 12000; ++i) {
+    const std::string rest = fmt::format("{},{}\n", i % 5, 2 * (i % 5) + i % 3);
+    text += fmt::format("w{},{:04}-{:02}-{:02},{}", i, 1990 + i / 336, 1 + i / 28 % 12, 1 + i % 28, rest);
+    plain += rest;
+  }
+  folder.write("d.csv", text);
+  folder.write("plain.csv", plain);
+  const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y --cv 0 -o m.json");
+  EXPECT_EQ(fitted.exit_code, 0);
+  for (const char* said : {"\"word\" has words, 12000 different ones in 12000 rows, and is left out",
+                           "\"when\" has dates, 12000 different ones in 12000 rows, and is left out"}) {
+    EXPECT_NE(fitted.err.find(said), std::string::npos) << fitted.err;
+  }
+  ASSERT_EQ(folder.run(llmt_program + " fit plain.csv -t y --cv 0 -o plain.json").exit_code, 0);
+  EXPECT_EQ(llmt::read_file(folder.file("m.json")), llmt::read_file(folder.file("plain.json")));
+  EXPECT_EQ(
+      refusal_of(folder, text, "fit d.csv -t y --categorical when"),
+      "llmt: column \"word\" has words, 12000 different ones in 12000 rows, and is left out; --categorical takes "
+      "it for categories\nllmt: d.csv:10002: column \"when\": more than 10000 categories (--ignore COLUMN leaves a "
+      "column out)\n");
+  EXPECT_EQ(refusal_of(folder, text, "fit d.csv -t y --inputs word,x"),
+            "llmt: d.csv:10002: column \"word\": more than 10000 categories\n");
+}
+
+// The only input stays, and nobody says that it is left out.
+TEST(BadData, ADateThatIsTheOnlyInputStays) {
+  const Folder folder;
+  std::string text = "when,y\n";
+  for (int i = 0; i < 40; ++i) text += fmt::format("2024-{:02}-{:02},{}\n", 1 + i / 28, 1 + i % 28, i % 7);
+  folder.write("d.csv", text);
+  const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y --cv 0");
+  EXPECT_EQ(fitted.exit_code, 0);
+  EXPECT_EQ(fitted.err.find("left out"), std::string::npos) << fitted.err;
+  EXPECT_NE(
+      fitted.err.find("has words, 40 different ones in 40 rows, and is taken for categories; it looks like a date"),
+      std::string::npos)
+      << fitted.err;
 }
 
 TEST(BadData, AColumnOfInfinityIsNoColumnOfWords) {

@@ -223,7 +223,8 @@ for format, words in (
     (b"d:10,2,7", "unknown"),
     (b"d:10,2147483647", "unknown"),
     (b"+zz", "nested values"),
-    (b"tdX", "dates"),
+    (b"tdX", "values of an unknown type"),
+    (b"tsx:", "values of an unknown type"),
     (b"tiM", "calendar intervals"),
     (b"tiD", "calendar intervals"),
 ):

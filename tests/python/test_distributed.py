@@ -270,6 +270,35 @@ def test_dask_finds_words_and_takes_weights(tmp_path, kind):
     assert np.sqrt(np.average((predicted - kept["y"]) ** 2, weights=kept["k"])) < 2 * NOISE
 
 
+@pytest.mark.parametrize("kind", ["datetime64", "Arrow", "folder"])
+def test_dask_leaves_dates_out(tmp_path, kind):
+    """Before, they were numbers: microseconds since 1970."""
+    dask = pytest.importorskip("dask")
+    frames = pytest.importorskip("dask.dataframe")
+    pa = pytest.importorskip("pyarrow")
+    pd = pytest.importorskip("pandas")
+    from llmt import dask as llmt_dask
+
+    rows = mixed()
+    dated = rows.assign(when=pd.date_range("2024-01-01", periods=len(rows), freq="h"))
+    if kind == "Arrow":
+        dated["when"] = dated["when"].astype(pd.ArrowDtype(pa.date32()))
+    options = {"estimator": LocalLinearTreeRegressor(validity="crisp", max_leaves=6), "weight": "k"}
+    with dask.config.set(scheduler="synchronous"):
+        if kind == "folder":
+            dated.to_parquet(tmp_path / "0.parquet")
+            table = tmp_path
+        else:
+            table = frames.from_pandas(dated, npartitions=2)
+        with pytest.warns(UserWarning, match='column "when" has dates, and is left out; give a number, as days'):
+            model = llmt_dask.fit(table, "y", **options)
+        plain = llmt_dask.fit(frames.from_pandas(rows, npartitions=2), "y", **options)
+        assert model.to_json() == plain.to_json()
+        assert len(llmt_dask.predict(model, table).compute()) == len(rows)
+        with pytest.raises(ValueError, match='column "when" holds dates'):
+            llmt_dask.fit(table, "y", inputs=["a", "when"], **options)
+
+
 def test_partitions_of_other_kinds_are_named(tmp_path):
     dask = pytest.importorskip("dask")
     frames = pytest.importorskip("dask.dataframe")

@@ -123,7 +123,7 @@ def _polars() -> None:
     add("Enum", lambda: pl.Series(WORDS).cast(pl.Enum(["z", "b", "a"])), WORDS)
     for name, make, words in (
         ("Date", lambda: pl.Series([DAY]), "dates"),
-        ("Datetime", lambda: pl.Series([NOON]), "timestamps"),
+        ("Datetime", lambda: pl.Series([NOON]), "holds dates"),
         ("Duration", lambda: pl.Series([HOUR]), "durations"),
         ("Time", lambda: pl.Series([datetime.time(12)]), "times of day"),
         ("Binary", lambda: pl.Series([b"a"]), "bytes"),
@@ -195,14 +195,14 @@ def _arrow_types() -> dict[str, tuple[Callable[[], Any], list[Any] | str]]:
         lambda: pa.DictionaryArray.from_arrays(pa.array([0, 1]), pa.array(["a", None])),
         ["a", None],
     )
-    add("dictionary of dates", lambda: pa.array([DAY]).dictionary_encode(), "holds a dictionary of dates")
+    add("dictionary of dates", lambda: pa.array([DAY]).dictionary_encode(), "holds dates")
     for name, make, words in (
         ("date32", lambda: pa.array([DAY]), "dates"),
         ("date64", lambda: pa.array([DAY], pa.date64()), "dates"),
         ("time32", lambda: pa.array([1], pa.time32("s")), "times of day"),
         ("time64", lambda: pa.array([1], pa.time64("us")), "times of day"),
-        ("timestamp", lambda: pa.array([NOON]), "timestamps"),
-        ("timestamp with zone", lambda: pa.array([NOON], pa.timestamp("s", "UTC")), "timestamps"),
+        ("timestamp", lambda: pa.array([NOON]), "holds dates"),
+        ("timestamp with zone", lambda: pa.array([NOON], pa.timestamp("s", "UTC")), "holds dates"),
         ("duration", lambda: pa.array([HOUR]), "durations"),
         ("month_day_nano_interval", lambda: pa.array([(1, 2, 3)], pa.month_day_nano_interval()), "calendar intervals"),
         ("binary", lambda: pa.array([b"a"]), "bytes"),

@@ -4,6 +4,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 #include <unistd.h>
 
 #include <cstring>
@@ -13,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "llmt/arrow.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/arrow_abi.hpp"
 #include "python/bindings/arrow_cells.hpp"
@@ -160,7 +162,10 @@ class ArrowTable {
         }
         words = texts;
       }
-      const char* const kind = column.type.is_text() ? "words" : column.type.is_dictionary ? "codes" : "numbers";
+      const char* const kind = column.type.kind == CellType::Kind::date ? "dates"
+                               : column.type.is_text()                  ? "words"
+                               : column.type.is_dictionary              ? "codes"
+                                                                        : "numbers";
       result.append(nb::make_tuple(column.name, kind, words));
     }
     return result;
@@ -214,8 +219,8 @@ class ArrowTable {
 
 // A capsule with a stream, or two with a schema and an array. Returns the values as float64 (rows x columns; NaN:
 // missing; a word is its position in the column's list of words), of each column (name, kind, words), and whether it is
-// a table or a column by itself, which is called `name` in errors. Kinds: "numbers", "words", and "codes": a dictionary
-// of numbers.
+// a table or a column by itself, which is called `name` in errors. Kinds: "numbers", "words", "dates", whose words are
+// date_text(), and "codes": a dictionary of numbers.
 nb::object read_arrow(const nb::object& capsule, const nb::object& array, const std::string& name) {
   Schema schema;
   std::vector<Chunk> chunks;
@@ -236,9 +241,17 @@ nb::object read_arrow(const nb::object& capsule, const nb::object& array, const 
   return nb::make_tuple(array_of<double>(std::move(values)), columns, table.is_table());
 }
 
+// The texts of moments that are counted from 1970 on.
+std::vector<std::string> date_texts(const std::vector<std::int64_t>& counts, std::int64_t per_day) {
+  std::vector<std::string> texts;
+  for (const std::int64_t count : counts) texts.push_back(date_text(count, per_day));
+  return texts;
+}
+
 }  // namespace
 
 void add_arrow(nb::module_& module) {
+  module.def("date_texts", &date_texts, nb::arg("counts"), nb::arg("per_day"));
   module.def("read_arrow", &read_arrow, nb::arg("capsule"), nb::arg("array") = nb::none(), nb::kw_only(),
              nb::arg("name") = "the column");
 }

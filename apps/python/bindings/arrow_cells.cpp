@@ -9,6 +9,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "llmt/arrow.hpp"
+
 namespace llmt::python {
 namespace {
 
@@ -167,7 +169,13 @@ void fill(const ArrowArray& array, std::int64_t first, std::int64_t rows, double
 
 void read_values(const ArrowArray& array, const CellType& type, std::int64_t first, std::int64_t rows,
                  const std::string& column, Words& words, double* out) {
-  if (type.is_text()) {
+  if (type.kind == Kind::date) {
+    const void* const counts = array.buffers[1];
+    fill(array, first, rows, out, [&](std::int64_t i) {
+      const std::int64_t count = type.bytes == 4 ? element<std::int32_t>(counts, i) : element<std::int64_t>(counts, i);
+      return words.position_of_date(count, type.per_day);
+    });
+  } else if (type.is_text()) {
     fill(array, first, rows, out, [&](std::int64_t i) { return words.position_of(text_at(array, type, i, column)); });
   } else {
     with_numbers(array, type, [&](auto read) { fill(array, first, rows, out, read); });
@@ -199,6 +207,12 @@ void read_dictionary(const ArrowArray& array, const CellType& type, std::int64_t
 double Words::position_of(std::string_view word) {
   const auto [found, is_new] = positions.try_emplace(word, static_cast<double>(in_order.size()));
   if (is_new) in_order.push_back(word);
+  return found->second;
+}
+
+double Words::position_of_date(std::int64_t count, std::int64_t per_day) {
+  const auto [found, is_new] = dates.try_emplace(count, 0.0);
+  if (is_new) found->second = position_of(made.emplace_back(date_text(count, per_day)));
   return found->second;
 }
 

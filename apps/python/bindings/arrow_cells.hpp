@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -13,12 +14,18 @@
 
 namespace llmt::python {
 
-/// Different words in order of appearance. They are views of the arrays that they come from.
+/// Different words in order of appearance. They are views of the arrays that they come from, and of `made`.
 struct Words {
   std::vector<std::string_view> in_order;
   std::unordered_map<std::string_view, double> positions;
 
+  std::deque<std::string> made;                    ///< texts of dates
+  std::unordered_map<std::int64_t, double> dates;  ///< positions of their texts
+
   double position_of(std::string_view word);
+
+  /// Of date_text(count, per_day); all dates have the same `per_day`.
+  double position_of_date(std::int64_t count, std::int64_t per_day);
 };
 
 /// Throws std::runtime_error if the array cannot hold `rows` cells of the type from cell `first`, counted before its

@@ -29,10 +29,8 @@ struct Refused {
 };
 
 // The first beginning that fits counts.
-constexpr std::array<Refused, 23> refused = {{
-    {"td", "dates", from_time},
+constexpr std::array<Refused, 21> refused = {{
     {"tt", "times of day", from_time},
-    {"ts", "timestamps", from_time},
     {"tD", "durations", "convert it to numbers, such as seconds, or leave it out"},
     {"ti", "calendar intervals", from_time},
     {"z", "bytes (binary)", "decode it to text, or leave it out"},
@@ -73,6 +71,19 @@ std::optional<std::array<int, 3>> decimal_of(std::string_view text) {
     at = stop + 1;
   }
   return std::nullopt;
+}
+
+// Days and milliseconds, and moments of any unit, whatever their zone: they count from 1970 in UTC.
+std::optional<CellType> date_type(std::string_view format) {
+  constexpr std::int64_t seconds = 86'400;
+  if (format == "tdD") return CellType{.kind = Kind::date, .bytes = 4, .per_day = 1};
+  if (format == "tdm") return CellType{.kind = Kind::date, .bytes = 8, .per_day = seconds * 1000};
+  if (!format.starts_with("ts") || format.size() < 4 || format[3] != ':') return std::nullopt;
+  constexpr std::string_view units = "smun";
+  const std::size_t unit = units.find(format[2]);
+  if (unit == std::string_view::npos) return std::nullopt;
+  constexpr std::array<std::int64_t, 4> per_second = {1, 1000, 1'000'000, 1'000'000'000};
+  return CellType{.kind = Kind::date, .bytes = 8, .per_day = seconds * per_second[unit]};
 }
 
 std::optional<CellType> simple_type(std::string_view format) {
@@ -133,6 +144,7 @@ CellType value_type(const ArrowSchema& schema, const std::string& column, const 
            "take its storage or convert it to numbers or text, or leave it out");
   }
   if (const auto type = simple_type(format)) return *type;
+  if (const auto type = date_type(format)) return *type;
   const auto* found =
       std::ranges::find_if(refused, [&](const Refused& type) { return format.starts_with(type.begin); });
   refuse(column, of + found->words, format, found->advice);

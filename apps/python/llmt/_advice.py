@@ -13,26 +13,33 @@ def warn_of_accidental_inputs(table: Table, meant: set[str], stacklevel: int) ->
     """Warns of columns that look like names, dates or numbers of the rows, or as if some of their numbers were none.
     Returns the positions of those that are left out. Tables without names are not looked at: their columns were chosen
     by hand."""
-    left_out: list[int] = []
     if table.names is None:
-        return left_out
-    for kind, position, detail, is_left_out in _core.accidental_inputs(table.values, table.levels):
+        return []
+    found = _core.accidental_inputs(table.values, table.levels)
+    found = [each for each in found if table.names[each[1]] not in meant]
+    left_out = [
+        position
+        for kind, position, _, is_left_out in found
+        if is_left_out and (kind == "dates" or not number_hint(table.levels[position], ""))
+    ]
+    if len(left_out) == len(table.names):  # one input stays at least
+        left_out = []
+    for kind, position, detail, _ in found:
         name = table.names[position]
-        if name in meant:
-            continue
         if kind == "row_numbers":
             text = "numbers the rows and is an input; leave it out of X if it is not meant"
         elif kind == "far_value":
             text = f"looks as if numbers stood for missing values: {detail}; if they do, make them NaN"
         elif kind == "unit":
             text = f"has {detail} in every cell, and is taken for categories; give the numbers alone to have numbers"
-        elif is_left_out and (kind == "dates" or not number_hint(table.levels[position], "")):
-            left_out.append(position)
+        elif position in left_out:
             text = (
                 f"has {kind}, {len(table.levels[position])} different ones in {len(table.values)} rows, and is left out; "
                 + ("give a number, as days; " if kind == "dates" else "")
                 + "categorical_features takes it for categories"
             )
+        elif len(table.levels[position]) > _core.most_categories:
+            continue  # refused by the caller
         elif kind == "dates":
             text = "looks like a date and is taken for categories; give a number, as days, or leave it out of X"
         elif hint := number_hint(table.levels[position], f'X["{name}"]'):
@@ -43,7 +50,7 @@ def warn_of_accidental_inputs(table: Table, meant: set[str], stacklevel: int) ->
                 "categories; leave it out of X if they are names of the rows, or name it in categorical_features"
             )
         warnings.warn(f'column "{name}" {text}', stacklevel=stacklevel)
-    return left_out if len(left_out) < len(table.names) else []
+    return left_out
 
 
 def warn_of_few_rows(rows: int, stacklevel: int) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from . import _advice, _core
 from ._base import BaseEstimator, NotFittedError, RegressorMixin
 from ._model import TextModel
-from .tables import UNKNOWN, Table, read_column, read_table, read_targets, row_labels
+from .tables import UNKNOWN, Table, read_column, read_table, read_targets, refuse_many_words, row_labels
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -215,7 +215,9 @@ class TableRegressor(RegressorMixin, BaseEstimator):
 
     def _read_rows(self, X: Any, y: Any, sample_weight: Any, groups: Any, eval_set: Any) -> "FitRows":
         """Reads and checks what `fit` is given, and warns of what is probably not meant."""
-        table = read_table(X, categorical=self.categorical_features, owner=type(self).__name__)
+        table = read_table(
+            X, categorical=self.categorical_features, owner=type(self).__name__, dates=True, any_words=True
+        )
         outputs, names = read_targets(y, owner=type(self).__name__)
         check_rows(len(table.values), len(outputs))
         rows = len(outputs)
@@ -239,6 +241,9 @@ class TableRegressor(RegressorMixin, BaseEstimator):
         meant = {str(name) for name in self.categorical_features}
         for position in _advice.warn_of_accidental_inputs(table, meant, stacklevel=4):
             table.values[:, position] = 0.0  # one level in all rows, of which nothing can be learned
+            if len(table.levels[position]) > _core.most_categories:
+                del table.levels[position][1:]
+        refuse_many_words(table)
         _advice.check_targets(outputs, self._outputs, self._robust(), stacklevel=4)
         _advice.warn_of_few_rows(rows, stacklevel=4)
         return FitRows(table, outputs, weights, labels, held_out, rows, (X, y, groups))
@@ -270,7 +275,7 @@ class TableRegressor(RegressorMixin, BaseEstimator):
         if len(given) != 2:
             raise ValueError("eval_set must be a pair (X, y)")
         X, y = given
-        rows = read_table(X, levels=table.levels, fitted_names=table.names, name="eval_set[0]").values
+        rows = read_table(X, levels=table.levels, fitted_names=table.names, name="eval_set[0]", dates=True).values
         rows = np.where((rows == UNKNOWN) & [bool(of) for of in table.levels], np.nan, rows)
         judged, _ = read_targets(y)
         check_rows(len(rows), len(judged))
@@ -289,7 +294,9 @@ class TableRegressor(RegressorMixin, BaseEstimator):
 
     def _table(self, X: Any) -> Table:
         self._model()
-        return read_table(X, levels=self._levels, fitted_names=self._fitted_names(), owner=type(self).__name__)
+        return read_table(
+            X, levels=self._levels, fitted_names=self._fitted_names(), owner=type(self).__name__, dates=True
+        )
 
     def _fitted_names(self) -> list[str] | None:
         names = getattr(self, "feature_names_in_", None)

@@ -42,12 +42,25 @@ def words_of(source: Any, name: str, columns: list[str]) -> dict[str, list[str]]
         columns = [column for column in columns if _may_have_words(source, column)]
     for frame in _frames(source, name, columns) if columns else ():
         for column in columns:
-            if column in frame and len(frame) and not _is_numeric(frame[column]):
+            if column in frame and len(frame) and not (_is_numeric(frame[column]) or is_of_dates(frame[column].dtype)):
                 try:
                     words.setdefault(column, set()).update(read_table(frame[[column]]).levels[0])
                 except (TypeError, ValueError) as error:
                     raise type(error)(f"{name}: {error}") from None
     return {column: sorted(levels) for column, levels in words.items()}
+
+
+def dates_of(path: str) -> list[str]:
+    """The columns of dates and moments of a file."""
+    from pyarrow import types
+
+    schema = open_parquet(path).schema_arrow
+    return [field.name for field in schema if types.is_date(field.type) or types.is_timestamp(field.type)]
+
+
+def is_of_dates(dtype: Any) -> bool:
+    """Whether a type of a column of pandas is one of dates or moments."""
+    return getattr(dtype, "kind", "O") == "M" or str(getattr(dtype, "pyarrow_dtype", "")).startswith("date")
 
 
 def _may_have_words(file: str, column: str) -> bool:
@@ -129,6 +142,8 @@ def _numbers(frame: Any, name: str, columns: list[str], levels: list[list[str]])
                 raise ValueError(f'{name}: column "{column}" is missing')
             values[:, position] = _places(frame[column], name, column, levels[position])
             continue
+        if column in frame and is_of_dates(frame[column].dtype):
+            raise ValueError(f'{name}: column "{column}" holds dates: convert it to numbers, such as days, or leave it out')
         try:
             values[:, position] = frame[column].to_numpy(dtype=float, na_value=np.nan)
         except (KeyError, TypeError, ValueError):

@@ -11,6 +11,7 @@ order and sizes of the partitions. Branches of the tree are fitted in the proces
 """
 
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +22,7 @@ import numpy as np
 from . import _core, distributed
 from ._estimator import LocalLinearTreeRegressor
 from ._files import write_bytes
-from ._shards import columns_of, count_rows, sum_rows, words_of
+from ._shards import columns_of, count_rows, dates_of, is_of_dates, sum_rows, words_of
 
 __all__ = ["fit", "predict"]
 
@@ -78,8 +79,14 @@ def fit(
     ValueError, FileNotFoundError, TimeoutError
         Naming the partition or file, its row and column, or the pass. No model is left half done.
     """
-    parts, columns = _partitions(table)
-    chosen = [name for name in columns if name not in (target, weight)] if inputs is None else list(inputs)
+    parts, columns, dates = _partitions(table)
+    if inputs is None:
+        chosen = [name for name in columns if name not in (target, weight) and name not in dates]
+        for name in dates:
+            if name not in (target, weight):
+                warnings.warn(f'column "{name}" has dates, and is left out; give a number, as days', stacklevel=2)
+    else:
+        chosen = list(inputs)
     named = [*chosen, target] if weight is None else [*chosen, target, weight]
     for name in named:
         if name not in columns:
@@ -142,15 +149,17 @@ class _Partition:
     name: str
 
 
-def _partitions(table: Any) -> tuple[list[_Partition], list[str]]:
-    """The partitions of a table, and its columns."""
+def _partitions(table: Any) -> tuple[list[_Partition], list[str], list[str]]:
+    """The partitions of a table, its columns, and those that hold dates."""
     if isinstance(table, (str, os.PathLike)):
         files = _parquet_files(table)
-        return [_Partition(file, file) for file in files], columns_of(files[0])
+        return [_Partition(file, file) for file in files], columns_of(files[0]), dates_of(files[0])
     if not hasattr(table, "to_delayed"):
         raise TypeError(f"a table is a Dask DataFrame or the path of a folder, not {type(table).__name__}")
     frames = enumerate(table.to_delayed())
-    return [_Partition(frame, f"partition {number}") for number, frame in frames], [str(name) for name in table.columns]
+    dates = [str(name) for name, dtype in table.dtypes.items() if is_of_dates(dtype)]
+    parts = [_Partition(frame, f"partition {number}") for number, frame in frames]
+    return parts, [str(name) for name in table.columns], dates
 
 
 def _parquet_files(folder: "str | os.PathLike[str]") -> list[str]:

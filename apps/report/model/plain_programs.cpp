@@ -150,18 +150,7 @@ class PythonWords : public Program {
     return fmt::format("{} if {} else {}", yes, condition, no);
   }
   std::string among(const std::string& x, const InputColumn& input, const std::vector<int>& levels) const override {
-    std::vector<std::string> named;
-    bool with_missing = false;
-    for (const int level : levels) {
-      const std::string& name = input.levels[level];
-      if (input.codes.empty()) {
-        named.push_back(in_quotes(name));
-      } else if (name.empty()) {
-        with_missing = true;
-      } else {
-        named.push_back(literal(input.codes[level]));
-      }
-    }
+    const auto [named, with_missing] = named_levels(input, levels, in_quotes);
     std::string text = named.size() == 1 ? fmt::format("{} == {}", x, named[0])
                        : named.empty()   ? "False"
                                          : fmt::format("{} in ({})", x, fmt::join(named, ", "));

@@ -46,18 +46,8 @@ class SqlWords : public PlainWords {
     return fmt::format("CASE WHEN {} THEN {} ELSE {} END", condition, yes, no);
   }
   std::string among(const std::string& x, const InputColumn& input, const std::vector<int>& levels) const override {
-    std::vector<std::string> named;
-    bool with_missing = false;
-    for (const int level : levels) {
-      const std::string& name = input.levels[level];
-      if (input.codes.empty()) {
-        named.push_back(in_single_quotes(name, '\''));
-      } else if (name.empty()) {
-        with_missing = true;
-      } else {
-        named.push_back(literal(input.codes[level]));
-      }
-    }
+    const auto [named, with_missing] =
+        named_levels(input, levels, [](const std::string& name) { return in_single_quotes(name, '\''); });
     const std::string is_one = named.empty()
                                    ? "1 = 0"
                                    : fmt::format("{}{} IN ({})", input.codes.empty() ? "" : x + " IS NOT NULL AND ", x,

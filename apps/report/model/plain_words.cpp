@@ -56,6 +56,22 @@ std::string in_comment(std::string text) {
   return text;
 }
 
+NamedLevels named_levels(const InputColumn& input, const std::vector<int>& levels,
+                         const std::function<std::string(const std::string&)>& in_quotes) {
+  NamedLevels result;
+  for (const int level : levels) {
+    const std::string& name = input.levels[level];
+    if (input.codes.empty()) {
+      result.names.push_back(in_quotes(name));
+    } else if (name.empty()) {
+      result.with_missing = true;
+    } else {
+      result.names.push_back(literal(input.codes[level]));
+    }
+  }
+  return result;
+}
+
 std::string nearest_code(const PlainWords& words, const std::string& x, const std::vector<double>& codes) {
   std::string text = literal(codes.back());
   for (std::size_t k = codes.size() - 1; k-- > 0;)

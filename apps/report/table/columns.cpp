@@ -45,7 +45,7 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 // Replaces the listed columns of `inputs` by categories. `declared`: the names of those in which NA and the like are
 // words.
 void read_categories(const Csv& csv, const std::vector<std::string>& names, const std::vector<std::string>& declared,
-                     const std::string& hint, InputColumns& inputs) {
+                     InputColumns& inputs) {
   std::vector<std::string> wanted;
   for (const int column : inputs.categorical) {
     wanted.push_back(names[column]);
@@ -61,9 +61,7 @@ void read_categories(const Csv& csv, const std::vector<std::string>& names, cons
     }
     auto found = seen[i].find(text);
     if (found == seen[i].end()) {
-      if (seen[i].size() == most_categories) {
-        csv.refuse(row, wanted[i], fmt::format("more than {} categories{}", most_categories, hint));
-      }
+      if (seen[i].size() == most_categories) inputs.beyond_limit.push_back({inputs.categorical[i], row});
       found = seen[i].emplace(text, std::ssize(seen[i])).first;
     }
     value = static_cast<double>(found->second);
@@ -231,7 +229,7 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   values.conservativeResize(Eigen::NoChange, std::ssize(roles.inputs));
   result.inputs.values = std::move(values);
   result.inputs.levels.resize(num_inputs);
-  read_categories(csv, roles.inputs, roles.categorical, advice.leave_out, result.inputs);
+  read_categories(csv, roles.inputs, roles.categorical, result.inputs);
   for (int i = 0; i < static_cast<int>(num_inputs); ++i) {
     const bool is_listed = std::ranges::count(result.inputs.marked, i, &MarkedCells::column) > 0;
     result.inputs.has_other_marks = result.inputs.has_other_marks || (!is_listed && cells[i].marked > 0);

@@ -35,6 +35,12 @@ struct MarkedCells {
   Eigen::Index count = 0;
 };
 
+/// A column of words with more than most_categories different ones, and the first row that has one too many.
+struct ManyWords {
+  int column = 0;
+  Eigen::Index row = 0;
+};
+
 /// Inputs to learn from.
 struct InputColumns {
   Eigen::MatrixXd values;                        ///< rows x columns; NaN: missing; categories as positions in `levels`
@@ -42,6 +48,7 @@ struct InputColumns {
   std::vector<int> categorical;                  ///< columns with levels
   std::vector<MarkedCells> marked = {};          ///< of columns of words that nobody called categories
   bool has_other_marks = false;                  ///< whether cells of other columns say so too
+  std::vector<ManyWords> beyond_limit = {};      ///< nobody can learn from these columns
 };
 
 struct LearningColumns {
@@ -74,7 +81,7 @@ void refuse_negative_weight(const Csv& csv, const std::string& column, const Eig
 ///
 /// Throws std::runtime_error `path:line: column "c": ...` for a cell that is needed as a number and is none, and for
 /// what the learner cannot take: numbers above `largest_input` (targets and weights: largest_magnitude), columns too
-/// small to be squared, negative weights, weights that are all 0, too many categories. Throws std::runtime_error
+/// small to be squared, negative weights, weights that are all 0. Throws std::runtime_error
 /// `path: column "c": ...` for a categorical column that is not among the inputs, and for a target or weight of words.
 LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, const ColumnAdvice& advice,
                                       double largest_input, int max_threads);

@@ -225,23 +225,33 @@ std::string far_value(const Eigen::Ref<const Eigen::VectorXd>& values) {
   return "";
 }
 
-std::vector<AccidentalInput> accidental_inputs(const InputColumns& inputs) {
+bool are_dates(const std::vector<std::string>& levels) {
+  return levels.size() > 1 && std::ranges::all_of(levels, looks_like_a_date);
+}
+
+std::optional<AccidentalInput> accidental_words(const std::vector<std::string>& levels, Eigen::Index rows) {
   using Kind = AccidentalInput::Kind;
   constexpr std::size_t most_levels = 20;
   constexpr double most_levels_per_row = 0.1;
   constexpr double levels_per_row_of_names = 0.5;
+  const double per_row = static_cast<double>(levels.size()) / static_cast<double>(rows);
+  const bool few = levels.size() <= most_levels || per_row <= most_levels_per_row;
+  const bool dates = are_dates(levels);
+  if (std::string writing = dates ? "" : common_writing(levels); !writing.empty()) {
+    return AccidentalInput{.kind = Kind::unit, .detail = std::move(writing)};
+  }
+  if (!dates && few) return std::nullopt;
+  const bool is_left_out = !few && (dates || per_row > levels_per_row_of_names);
+  return AccidentalInput{.kind = dates ? Kind::dates : Kind::words, .is_left_out = is_left_out};
+}
+
+std::vector<AccidentalInput> accidental_inputs(const InputColumns& inputs) {
+  using Kind = AccidentalInput::Kind;
   std::vector<AccidentalInput> found;
   for (const int column : inputs.categorical) {
-    const std::size_t levels = inputs.levels[column].size();
-    const auto rows = static_cast<double>(inputs.values.rows());
-    const double per_row = static_cast<double>(levels) / rows;
-    const bool few = levels <= most_levels || per_row <= most_levels_per_row;
-    const bool dates = levels > 1 && std::ranges::all_of(inputs.levels[column], looks_like_a_date);
-    if (const std::string writing = dates ? "" : common_writing(inputs.levels[column]); !writing.empty()) {
-      found.push_back({Kind::unit, column, writing});
-    } else if (dates || !few) {
-      const bool is_left_out = !few && (dates || per_row > levels_per_row_of_names);
-      found.push_back({.kind = dates ? Kind::dates : Kind::words, .input = column, .is_left_out = is_left_out});
+    if (const auto words = accidental_words(inputs.levels[column], inputs.values.rows())) {
+      found.push_back(*words);
+      found.back().input = column;
     }
   }
   for (int column = 0; column < inputs.values.cols(); ++column) {

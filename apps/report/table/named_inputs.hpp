@@ -2,6 +2,8 @@
 /// Inputs that a caller names, and inputs that a table has by accident.
 #pragma once
 
+#include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,6 +43,13 @@ struct AccidentalInput {
 /// `9 of 60 cells are -999, far from all others (-2.1 to 3.4)`, where at least 3 values, and a hundredth, are the
 /// smallest or the largest one, and farther from the next than all others from each other; else empty. NaN is no value.
 std::string far_value(const Eigen::Ref<const Eigen::VectorXd>& values);
+
+/// What an input of words is in a table of `rows` rows; nothing where its words are usual categories. `levels`: its
+/// different words. A date is as in `2024-03-31`, `31.3.24` or `3/31/2024 14:05`.
+std::optional<AccidentalInput> accidental_words(const std::vector<std::string>& levels, Eigen::Index rows);
+
+/// Whether all words are dates, and there are several.
+bool are_dates(const std::vector<std::string>& levels);
 
 /// Such inputs: those of words first.
 std::vector<AccidentalInput> accidental_inputs(const InputColumns& inputs);

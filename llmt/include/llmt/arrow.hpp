@@ -22,8 +22,8 @@ namespace llmt {
 using NextRows = std::function<std::optional<Eigen::MatrixXd>()>;
 
 /// An Arrow IPC file of flat columns, opened for reading. What is read are integers of 8 to 64 bits and floating-point
-/// numbers of 32 and 64 bits, and text, whole or by a dictionary, with or without missing values; columns of dates and
-/// other flat types may be there.
+/// numbers of 32 and 64 bits, text, whole or by a dictionary, and dates as text, all with or without missing values;
+/// columns of other flat types may be there.
 /// Copies share the file. It may be used by several threads at a time.
 ///
 /// Source: the Arrow columnar format, versions 1.0 and later (metadata version 5; 4 is read, too).
@@ -50,10 +50,11 @@ class ArrowTable {
   /// read; std::invalid_argument for rows that do not exist.
   Eigen::MatrixXd read(Eigen::Index first, Eigen::Index count, std::span<const std::string> columns) const;
 
-  /// Whether a column holds text. Throws std::runtime_error as read() for one that does not exist.
+  /// Whether a column holds text, or dates, whose text is date_text(). Throws std::runtime_error as read() for one that
+  /// does not exist.
   bool has_text(const std::string& column) const;
 
-  /// The cells of a column of text; empty where one is missing. Throws as read().
+  /// The cells of a column of text or dates; empty where one is missing. Throws as read().
   std::vector<std::string> texts(Eigen::Index first, Eigen::Index count, const std::string& column) const;
 
   struct Parts;
@@ -61,6 +62,11 @@ class ArrowTable {
  private:
   std::shared_ptr<const Parts> parts_;
 };
+
+/// The text of a date or a moment that is counted from the beginning of 1970 in the proleptic Gregorian calendar:
+/// `2024-02-29`, and where it is not midnight `2024-02-29 12:00:00.5`. `per_day`: units of `count` in a day, 1 or a
+/// multiple of 86400. A moment with a zone of time is counted, and written, in UTC.
+std::string date_text(std::int64_t count, std::int64_t per_day);
 
 /// Whether a file begins as an Arrow file does. False for what is no regular file or cannot be read.
 bool is_arrow_file(const std::string& path);

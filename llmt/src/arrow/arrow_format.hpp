@@ -39,13 +39,16 @@ namespace type {
 inline constexpr std::uint8_t null = 1;
 inline constexpr std::uint8_t integer = 2;
 inline constexpr std::uint8_t floating = 3;
-inline constexpr std::uint8_t text = 5;         ///< UTF-8, with offsets of 32 bits
+inline constexpr std::uint8_t text = 5;  ///< UTF-8, with offsets of 32 bits
+inline constexpr std::uint8_t date = 8;
+inline constexpr std::uint8_t moment = 10;
 inline constexpr std::uint8_t large_text = 20;  ///< with offsets of 64 bits
 inline constexpr int bit_width = 0;             ///< of an integer
 inline constexpr int is_signed = 1;
 inline constexpr int precision = 0;  ///< of a floating-point number
 inline constexpr std::int16_t single_precision = 1;
 inline constexpr std::int16_t double_precision = 2;
+inline constexpr int unit = 0;  ///< of a date: 0 days, 1 milliseconds; of a moment: 0 seconds, 1 ms, 2 us, 3 ns
 }  // namespace type
 
 namespace dictionary {  // DictionaryEncoding of a field

@@ -37,8 +37,10 @@ struct Column {
   std::optional<std::int64_t> dictionary;  ///< its number; `text` are its values
   std::size_t buffers = 2;
   std::size_t first_buffer = 0;  ///< among those of a batch
+  std::int64_t per_day = 0;      ///< of dates: how many units a day has, of which `numbers` count
 
-  bool is_number() const { return numbers != Numbers::none && !dictionary; }
+  bool is_date() const { return per_day > 0; }
+  bool is_number() const { return numbers != Numbers::none && !dictionary && !is_date(); }
 };
 
 struct Batch {
@@ -106,6 +108,10 @@ struct ArrowTable::Parts {
   /// Rows begin ... end - 1 of a batch; NaN where a value is missing.
   void read_numbers(const arrow_file::Batch& batch, const arrow_file::Column& column, Eigen::Index begin,
                     Eigen::Index end, Eigen::Ref<Eigen::VectorXd> to) const;
+
+  /// The texts of rows begin ... end - 1 of a column of dates; empty where one is missing.
+  std::vector<std::string> read_dates(const arrow_file::Batch& batch, const arrow_file::Column& column,
+                                      Eigen::Index begin, Eigen::Index end) const;
 
   std::vector<bool> read_valid(const arrow_file::Batch& batch, const arrow_file::Column& column, Eigen::Index begin,
                                Eigen::Index end) const;

@@ -53,6 +53,18 @@ Numbers numbers_of(const FlatTable& field, std::uint8_t kind) {
   return kind == type::integer ? integers_of(field.table(field::type)) : Numbers::none;
 }
 
+// How many units a day has of a column that counts days, or parts of a day, from 1970-01-01; 0: it is no such column.
+std::int64_t units_per_day(const FlatTable& field, std::uint8_t kind) {
+  if (kind != type::date && kind != type::moment) return 0;
+  const bool is_moment = kind == type::moment;
+  const auto unit = field.table(field::type).number<std::int16_t>(type::unit, is_moment ? 0 : 1);
+  constexpr std::array<std::int64_t, 2> of_date = {1, 86'400'000};
+  constexpr std::array<std::int64_t, 4> of_moment = {86'400, 86'400'000, 86'400'000'000, 86'400'000'000'000};
+  const std::size_t known = is_moment ? of_moment.size() : of_date.size();
+  if (unit < 0 || std::cmp_greater_equal(unit, known)) throw std::runtime_error("the metadata is damaged");
+  return is_moment ? of_moment[static_cast<std::size_t>(unit)] : of_date[static_cast<std::size_t>(unit)];
+}
+
 Text text_of(std::uint8_t kind) {
   if (kind == type::text) return Text::small;
   return kind == type::large_text ? Text::large : Text::none;
@@ -92,7 +104,10 @@ void ArrowTable::Parts::read_schema(const FlatTable& schema, std::size_t most_by
       column.numbers =
           encoding.has(dictionary::index_type) ? integers_of(encoding.table(dictionary::index_type)) : Numbers::int32;
     } else {
-      column.numbers = numbers_of(field, kind);
+      column.per_day = units_per_day(field, kind);
+      column.numbers = column.per_day == 0   ? numbers_of(field, kind)
+                       : column.per_day == 1 ? Numbers::int32
+                                             : Numbers::int64;
       column.buffers = buffers_of(kind, column.name);
     }
     column.first_buffer = buffers;

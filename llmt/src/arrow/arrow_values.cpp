@@ -51,18 +51,45 @@ void convert(Numbers numbers, const std::string& bytes, Eigen::Index count, Eige
   }
 }
 
-template <class Offset>
-std::vector<std::int64_t> offsets_of(const std::string& bytes) {
-  std::vector<std::int64_t> offsets(bytes.size() / sizeof(Offset));
-  for (std::size_t i = 0; i < offsets.size(); ++i) {
-    Offset offset;
-    std::memcpy(&offset, bytes.data() + i * sizeof offset, sizeof offset);
-    offsets[i] = offset;
+template <class T>
+std::vector<std::int64_t> integers_of_bytes(const std::string& bytes) {
+  std::vector<std::int64_t> integers(bytes.size() / sizeof(T));
+  for (std::size_t i = 0; i < integers.size(); ++i) {
+    T value;
+    std::memcpy(&value, bytes.data() + i * sizeof value, sizeof value);
+    integers[i] = value;
   }
-  return offsets;
+  return integers;
 }
 
 }  // namespace
+
+std::string date_text(std::int64_t count, std::int64_t per_day) {
+  const std::int64_t days = count / per_day - (count % per_day < 0 ? 1 : 0);
+  const std::int64_t of_day = count - days * per_day;
+  // Years begin in March, so that a leap day is the last one; an era has 400 years, or 146097 days.
+  constexpr std::int64_t days_to_1970 = 719468;  // from 0000-03-01
+  const std::int64_t since = days + days_to_1970;
+  const std::int64_t era = since / 146097 - (since % 146097 < 0 ? 1 : 0);
+  const std::int64_t in_era = since - era * 146097;
+  const std::int64_t year_of_era = (in_era - in_era / 1460 + in_era / 36524 - in_era / 146096) / 365;
+  const std::int64_t in_year = in_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+  const std::int64_t from_march = (5 * in_year + 2) / 153;
+  const std::int64_t day = in_year - (153 * from_march + 2) / 5 + 1;
+  const std::int64_t month = from_march < 10 ? from_march + 3 : from_march - 9;
+  std::string text = fmt::format("{:04}-{:02}-{:02}", year_of_era + era * 400 + (month <= 2 ? 1 : 0), month, day);
+  if (of_day == 0) return text;
+  const std::int64_t per_second = per_day / 86400;
+  const std::int64_t second = of_day / per_second;
+  text += fmt::format(" {:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60);
+  if (std::int64_t part = of_day % per_second; part > 0) {
+    text += '.';
+    for (std::int64_t unit = per_second / 10; part > 0; part %= unit, unit /= 10) {
+      text += static_cast<char>('0' + part / unit);
+    }
+  }
+  return text;
+}
 
 const Column& ArrowTable::Parts::column(const std::string& name) const {
   const auto found = places.find(name);
@@ -79,6 +106,21 @@ void ArrowTable::Parts::read_numbers(const Batch& batch, const Column& column, E
   for (Eigen::Index i = 0; i < end - begin; ++i) {
     if (!valid[static_cast<std::size_t>(i)]) to(i) = std::numeric_limits<double>::quiet_NaN();
   }
+}
+
+std::vector<std::string> ArrowTable::Parts::read_dates(const Batch& batch, const Column& column, Eigen::Index begin,
+                                                       Eigen::Index end) const {
+  const auto each = static_cast<std::int64_t>(bytes_of(column.numbers));
+  const std::int64_t values = batch.body + batch.buffers[column.first_buffer + 1][0];
+  const std::string found = read(values + begin * each, (end - begin) * each);
+  const std::vector<std::int64_t> counts =
+      each == 4 ? integers_of_bytes<std::int32_t>(found) : integers_of_bytes<std::int64_t>(found);
+  const std::vector<bool> valid = read_valid(batch, column, begin, end);
+  std::vector<std::string> texts(counts.size());
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    if (valid[i]) texts[i] = date_text(counts[i], column.per_day);
+  }
+  return texts;
 }
 
 std::vector<bool> ArrowTable::Parts::read_valid(const Batch& batch, const Column& column, Eigen::Index begin,
@@ -102,7 +144,7 @@ std::vector<std::string> ArrowTable::Parts::read_texts(const Batch& batch, std::
   const std::int64_t each = text == Text::small ? 4 : 8;
   const std::string numbers = read(batch.body + batch.buffers[buffer + 1][0] + begin * each, (end - begin + 1) * each);
   const std::vector<std::int64_t> offsets =
-      text == Text::small ? offsets_of<std::int32_t>(numbers) : offsets_of<std::int64_t>(numbers);
+      text == Text::small ? integers_of_bytes<std::int32_t>(numbers) : integers_of_bytes<std::int64_t>(numbers);
   if (!std::ranges::is_sorted(offsets) || offsets.front() < 0 || offsets.back() > batch.buffers[buffer + 2][1]) {
     fail(fmt::format("the text of column \"{}\" is damaged", column));
   }
@@ -119,7 +161,10 @@ const std::string& ArrowTable::path() const { return parts_->bytes.name(); }
 const std::vector<std::string>& ArrowTable::columns() const { return parts_->names; }
 Eigen::Index ArrowTable::rows() const { return parts_->rows; }
 
-bool ArrowTable::has_text(const std::string& column) const { return parts_->column(column).text != Text::none; }
+bool ArrowTable::has_text(const std::string& column) const {
+  const Column& found = parts_->column(column);
+  return found.text != Text::none || found.is_date();
+}
 
 namespace {
 
@@ -156,7 +201,7 @@ Eigen::MatrixXd ArrowTable::read(Eigen::Index first, Eigen::Index count, std::sp
 
 std::vector<std::string> ArrowTable::texts(Eigen::Index first, Eigen::Index count, const std::string& name) const {
   const Column& column = parts_->column(name);
-  if (column.text == Text::none) parts_->fail(fmt::format("column \"{}\" holds no text", column.name));
+  if (!has_text(name)) parts_->fail(fmt::format("column \"{}\" holds no text", column.name));
   std::vector<std::string> result;
   const auto add_from_dictionary = [&](const Batch& batch, Eigen::Index begin, Eigen::Index end, Eigen::Index) {
     const auto dictionary = parts_->dictionaries.find(*column.dictionary);
@@ -183,7 +228,11 @@ std::vector<std::string> ArrowTable::texts(Eigen::Index first, Eigen::Index coun
     for (std::size_t i = 0; i < texts.size(); ++i) result.push_back(valid[i] ? std::move(texts[i]) : std::string());
   };
   for_batches(*parts_, first, count, [&](const Batch& batch, Eigen::Index begin, Eigen::Index end, Eigen::Index at) {
-    column.dictionary ? add_from_dictionary(batch, begin, end, at) : add_texts(batch, begin, end, at);
+    if (column.is_date()) {
+      for (std::string& text : parts_->read_dates(batch, column, begin, end)) result.push_back(std::move(text));
+    } else {
+      column.dictionary ? add_from_dictionary(batch, begin, end, at) : add_texts(batch, begin, end, at);
+    }
   });
   return result;
 }

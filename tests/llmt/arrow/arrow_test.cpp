@@ -1,9 +1,11 @@
 // Tables in Arrow files: what is written is read, and what is damaged is refused.
 #include "llmt/arrow.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -118,6 +120,37 @@ TEST_F(ArrowTest, TextIsReadWholeAndByItsDictionary) {
     }
   }
   EXPECT_GT(refused, 50);
+}
+
+TEST_F(ArrowTest, DatesAreReadAsTheirText) {
+  write_file(path_, arrow_files::dates());
+  const ArrowTable table = ArrowTable::open(path_);
+  using Words = std::vector<std::string>;
+  EXPECT_EQ(table.texts(0, 4, "d"), (Words{"2024-02-29", "", "1969-12-31", "0001-01-01"}));
+  EXPECT_EQ(table.texts(0, 4, "m"), (Words{"2024-02-29 12:34:56.789", "", "1969-12-31 23:59:59.999", "1970-01-01"}));
+  EXPECT_EQ(table.texts(0, 4, "n"), (Words{"2024-02-29 00:00:00.123456789", "1970-01-01", "", "1969-12-31"}));
+  EXPECT_EQ(table.texts(2, 2, "d"), (Words{"1969-12-31", "0001-01-01"}));
+  EXPECT_TRUE(table.has_text("d") && table.has_text("m") && table.has_text("n"));
+  EXPECT_FALSE(table.has_text("y"));
+  EXPECT_THROW(table.read(0, 1, Words{"d"}), std::runtime_error);
+}
+
+// The calendar of the standard library says the same on every 97th day of eleven thousand years.
+TEST(DateText, IsThatOfTheStandardCalendar) {
+  using std::chrono::days;
+  using std::chrono::sys_days;
+  const sys_days first = sys_days(std::chrono::year(-999) / 1 / 1);
+  const sys_days last = sys_days(std::chrono::year(9999) / 12 / 31);
+  for (sys_days day = first; day <= last; day += days(97)) {
+    const std::chrono::year_month_day date(day);
+    const std::string expected = fmt::format("{:04}-{:02}-{:02}", static_cast<int>(date.year()),
+                                             static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()));
+    const std::int64_t count = day.time_since_epoch().count();
+    ASSERT_EQ(date_text(count, 1), expected);
+    ASSERT_EQ(date_text(count * 86'400'000 + 3'723'040, 86'400'000), expected + " 01:02:03.04");
+  }
+  EXPECT_EQ(date_text(-1, 86'400), "1969-12-31 23:59:59");
+  EXPECT_EQ(date_text(std::numeric_limits<std::int64_t>::max(), 86'400'000'000'000), "2262-04-11 23:47:16.854775807");
 }
 
 TEST_F(ArrowTest, AFileOfAnotherProgramIsRead) {

@@ -13,11 +13,12 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from .categories import UNKNOWN, by_given_levels, by_own_levels, positions_of
-from .raw import Raw, feature_names, number_hint, place_of, refuse_infinite
+from .._core import most_categories
+from .categories import UNKNOWN, by_given_levels, by_own_levels, positions_of, refuse_many
+from .raw import Raw, feature_names, number_hint, place, place_of, refuse_dates, refuse_infinite
 from .sources import read_raw
 
-__all__ = ["UNKNOWN", "Table", "read_column", "read_table", "read_targets", "row_labels"]
+__all__ = ["UNKNOWN", "Table", "read_column", "read_table", "read_targets", "refuse_many_words", "row_labels"]
 
 _OWNER = "LocalLinearTreeRegressor"
 _RESHAPE = (
@@ -51,6 +52,8 @@ def read_table(
     name: str = "X",
     owner: str = _OWNER,
     fitted_names: Sequence[str] | None = _UNCHECKED,
+    dates: bool = False,
+    any_words: bool = False,
 ) -> Table:
     """Reads a table of inputs.
 
@@ -65,6 +68,10 @@ def read_table(
 
     ``categorical``: names or positions of columns that are categories although they are numbers. Their labels are the
     shortest texts of the numbers.
+
+    ``dates``: columns of dates and moments are read as words, their texts, where the columns have names; else they are
+    a TypeError. ``any_words``: columns of any number of different words are read where they are not in
+    ``categorical``, for a caller that leaves some of them out and calls refuse_many_words() on the rest.
 
     A float64 array without categories is not copied. Frames are copied once, column by column.
 
@@ -92,12 +99,21 @@ def read_table(
                 f"Found array with 0 {what}(s) (shape={(rows, columns)}) while a minimum of 1 is required by {owner}."
             )
     refuse_infinite(raw, name)
+    if not dates or names is None:
+        refuse_dates(raw, name)
     if levels is not None:
         unknown = [by_given_levels(raw, j, list(given)) for j, given in enumerate(levels)]
         return Table(raw.values, names, [list(given) for given in levels], unknown)
     declared = positions_of(categorical, names, columns)
-    found = [by_own_levels(raw, j, j in declared) for j in range(columns)]
+    most = [None if any_words and j not in declared else most_categories for j in range(columns)]
+    found = [by_own_levels(raw, j, j in declared, most[j]) for j in range(columns)]
     return Table(raw.values, names, found, [{} for _ in range(columns)])
+
+
+def refuse_many_words(table: Table) -> None:
+    """Raises ValueError for the first column with more categories than can be learnt."""
+    for position, levels in enumerate(table.levels):
+        refuse_many(levels, place(position if table.names is None else table.names[position]))
 
 
 def _refuse_series(X: Any) -> NoReturn:
@@ -148,6 +164,7 @@ def row_labels(groups: Any, rows: int, *, name: str = "groups") -> np.ndarray:
 
 def _read_numbers(y: Any, name: str) -> tuple[np.ndarray, list[str] | None]:
     raw = read_raw(y, name)
+    refuse_dates(raw, name)
     for j, column in enumerate(raw.columns):
         if column.words is not None and not np.isnan(raw.values[:, j]).all():
             row = int(np.flatnonzero(~np.isnan(raw.values[:, j]))[0])

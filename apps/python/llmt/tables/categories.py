@@ -74,14 +74,20 @@ def by_own_levels(raw: Raw, column: int, declared: bool, most: int | None = most
         labels = [text_of(number) for number in numbers]
     levels = sorted(set(labels) - {""})  # by code point, which is the order of the bytes of UTF-8
     where = place_of(raw, column, "the column")
-    if most is not None and len(levels) > most:
-        raise ValueError(f"{where} has {len(levels)} categories; at most {most} can be learnt: leave it out")
+    if most is not None:
+        refuse_many(levels, where, most)
     for level in levels:
         if not level.isascii():
             refuse_surrogates(level, f"{level!r} in {where}")
     position = {level: float(k) for k, level in enumerate(levels)}
     cells[:] = np.array([position.get(label, np.nan) for label in labels] + [np.nan])[index]
     return levels or (["(none)"] if declared else [])
+
+
+def refuse_many(levels: list[str], where: str, most: int = most_categories) -> None:
+    """Raises ValueError if there are more than ``most`` labels."""
+    if len(levels) > most:
+        raise ValueError(f"{where} has {len(levels)} categories; at most {most} can be learnt: leave it out")
 
 
 def by_given_levels(raw: Raw, column: int, levels: list[str]) -> dict[str, int]:
@@ -104,7 +110,8 @@ def by_given_levels(raw: Raw, column: int, levels: list[str]) -> dict[str, int]:
         if is_word.any():
             row = int(np.argmax(is_word))
             raise TypeError(
-                f"{place_of(raw, column, 'the column')} holds words ({words[index[row]]!r} in row {row}); in training "
+                f"{place_of(raw, column, 'the column')} holds {'dates' if raw.columns[column].dates else 'words'} "
+                f"({words[index[row]]!r} in row {row}); in training "
                 "it held numbers"
             )
         raw.writable(column)[:] = np.nan

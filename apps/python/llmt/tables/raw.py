@@ -17,6 +17,7 @@ class Column:
 
     words: list[str] | None = None  # cells are positions in this list, of which some may not occur; None: numbers
     declared: bool = False  # numbers that the source declares to be categories
+    dates: str = ""  # the type of a column of dates or moments, whose words are their texts; empty: it is none
 
 
 @dataclass
@@ -48,6 +49,13 @@ def place_of(raw: Raw, column: int, name: str) -> str:
     if raw.dimensions == 1:
         return name
     return place(raw.labels[column] if raw.labels is not None else column)
+
+
+def refuse_dates(raw: Raw, name: str) -> None:
+    """Raises TypeError for the first column of dates."""
+    for j, column in enumerate(raw.columns):
+        if column.dates:
+            refuse_type(place_of(raw, j, name), "dates", column.dates)
 
 
 _TIMES = "convert it to numbers, such as days since a first date, or leave it out"

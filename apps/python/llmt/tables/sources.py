@@ -47,7 +47,7 @@ def from_arrow(table: Any, name: str) -> Raw:
         capsules = table.__arrow_c_array__()
     read: Any = read_arrow(*capsules, name=name)
     values, columns, is_table = read
-    found = [Column(words, kind == "codes") for _, kind, words in columns]
+    found = [Column(words, kind == "codes", "Arrow" if kind == "dates" else "") for _, kind, words in columns]
     labels = [label for label, _, _ in columns]
     return Raw(values, found, labels, 2 if is_table else 1, series=not is_table, owned=True)
 
