@@ -69,6 +69,32 @@ TEST(Check, UnchangedRowsAreGood) {
   EXPECT_GE(good, 53);  // at 95 % fewer come once in 300
 }
 
+// The record has a hundred evenly spaced values of the training rows, so that its moments are good to some per cent.
+TEST(Check, ShiftsAreInStandardDeviationsOfTheTrainingRows) {
+  const Eigen::MatrixXd before = drawn(600, 1).inputs;
+  Rows rows = drawn(150, 300);
+  rows.inputs.col(1).array() += 4.0;
+  const TableCheck found = llmt::check(fitted(), rows.inputs, rows.outputs);
+  for (const Eigen::Index j : {0, 1}) {
+    const double mean = before.col(j).mean();
+    const double deviation = std::sqrt((before.col(j).array() - mean).square().mean());
+    EXPECT_NEAR(found.inputs[j].training_mean, mean, 1e-9);
+    EXPECT_NEAR(found.inputs[j].mean, rows.inputs.col(j).mean(), 1e-9);
+    const double shift = (rows.inputs.col(j).mean() - mean) / deviation;
+    EXPECT_NEAR(found.inputs[j].shift, shift, 0.05 * std::abs(shift) + 0.01);
+  }
+}
+
+TEST(Check, OneRowHasAnError) {
+  Rows rows = drawn(40, 301);
+  rows.outputs.bottomRows(39).setConstant(nothing);
+  const TableCheck found = llmt::check(fitted(), rows.inputs, rows.outputs);
+  EXPECT_EQ(found.verdict, CheckVerdict::not_evaluated);
+  EXPECT_EQ(found.targets[0].rows, 1);
+  const double error = rows.outputs(0, 0) - fitted().model.predict(rows.inputs.topRows(1))(0, 0);
+  EXPECT_NEAR(found.targets[0].rmse, std::abs(error), 1e-12);
+}
+
 TEST(Check, DoubledNoiseIsNoLongerGood) {
   for (int draw = 0; draw < 10; ++draw) {
     const Rows rows = drawn(150, 200 + static_cast<std::uint64_t>(draw), 0.2);
