@@ -1,8 +1,9 @@
 /// \file
 /// How far measured outputs lie from free runs of a model, as runs over held-out stretches tell.
 ///
-///     const llmt::Run run = llmt::simulate(model, inputs, outputs.topRows(model.memory()));
-///     const llmt::Bounds bounds = llmt::run_bounds(model, run, 0.9);  // bounds.lower, bounds.upper: rows x outputs
+///     const llmt::DynamicModel drive = llmt::load_dynamic("drive.json");
+///     const llmt::Run run = llmt::simulate(drive, inputs, outputs.topRows(drive.memory()));
+///     const llmt::Bounds bounds = llmt::run_bounds(drive, run, 0.9);  // bounds.lower, bounds.upper: rows x outputs
 #pragma once
 
 #include <Eigen/Core>

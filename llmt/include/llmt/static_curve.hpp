@@ -2,7 +2,7 @@
 /// Where a system that moves comes to rest: the steady outputs over a steady input.
 ///
 ///     const llmt::StaticCurve curve = llmt::static_curve(llmt::load_dynamic("drive.json"), 0);
-///     for (const llmt::RestPoint& point : curve.points) use(point.input, point.outputs(0), point.is_stable);
+///     const llmt::RestPoint& first = curve.points.front();  // first.input, first.outputs, first.is_stable
 #pragma once
 
 #include <Eigen/Core>

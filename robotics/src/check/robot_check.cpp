@@ -54,7 +54,8 @@ double mean_distance(double noise_mm, const Measurements& measurements) {
   return noise_mm * factors[std::ranges::count(measurements.measured, true) - 1];
 }
 
-void set_limit(const CorrectedRobot& corrected, const Measurements& measurements, const CheckOptions& options, RobotCheck& result) {
+void set_limit(const CorrectedRobot& corrected, const Measurements& measurements, const CheckOptions& options,
+               RobotCheck& result) {
   if (options.accuracy_mm) {
     result.accuracy_mm = result.limit_mm = *options.accuracy_mm;
     return;

@@ -116,8 +116,8 @@ CalibrationRecord read_record(YamlMap map, const Robot& robot) {
       }
     }
   }
-  map.finish({"poses", "coordinates", "noise_mm", "held_out_mm", "held_out_sd_mm", "held_out_poses", "made_from", "joint_ranges",
-              "condition_ranges", "correlations"});
+  map.finish({"poses", "coordinates", "noise_mm", "held_out_mm", "held_out_sd_mm", "held_out_poses", "made_from",
+              "joint_ranges", "condition_ranges", "correlations"});
   return record;
 }
 
