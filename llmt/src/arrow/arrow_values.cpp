@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -65,19 +66,16 @@ std::vector<std::int64_t> integers_of_bytes(const std::string& bytes) {
 }  // namespace
 
 std::string date_text(std::int64_t count, std::int64_t per_day) {
-  const std::int64_t days = count / per_day - (count % per_day < 0 ? 1 : 0);
-  const std::int64_t of_day = count - days * per_day;
-  // Years begin in March, so that a leap day is the last one; an era has 400 years, or 146097 days.
-  constexpr std::int64_t days_to_1970 = 719468;  // from 0000-03-01
-  const std::int64_t since = days + days_to_1970;
-  const std::int64_t era = since / 146097 - (since % 146097 < 0 ? 1 : 0);
-  const std::int64_t in_era = since - era * 146097;
-  const std::int64_t year_of_era = (in_era - in_era / 1460 + in_era / 36524 - in_era / 146096) / 365;
-  const std::int64_t in_year = in_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-  const std::int64_t from_march = (5 * in_year + 2) / 153;
-  const std::int64_t day = in_year - (153 * from_march + 2) / 5 + 1;
-  const std::int64_t month = from_march < 10 ? from_march + 3 : from_march - 9;
-  std::string text = fmt::format("{:04}-{:02}-{:02}", year_of_era + era * 400 + (month <= 2 ? 1 : 0), month, day);
+  const std::int64_t day = count / per_day - (count % per_day < 0 ? 1 : 0);
+  const std::int64_t of_day = count - day * per_day;
+  constexpr std::chrono::sys_days first = std::chrono::year::min() / 1 / 1;
+  constexpr std::chrono::sys_days last = std::chrono::year::max() / 12 / 31;
+  std::string text = fmt::format("day {} of 1970", day);
+  if (day >= first.time_since_epoch().count() && day <= last.time_since_epoch().count()) {
+    const std::chrono::year_month_day date = std::chrono::sys_days(std::chrono::days(day));
+    text = fmt::format("{:04}-{:02}-{:02}", static_cast<int>(date.year()), static_cast<unsigned>(date.month()),
+                       static_cast<unsigned>(date.day()));
+  }
   if (of_day == 0) return text;
   const std::int64_t per_second = per_day / 86400;
   const std::int64_t second = of_day / per_second;

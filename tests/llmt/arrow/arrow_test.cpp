@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -135,20 +134,23 @@ TEST_F(ArrowTest, DatesAreReadAsTheirText) {
   EXPECT_THROW(table.read(0, 1, Words{"d"}), std::runtime_error);
 }
 
-// The calendar of the standard library says the same on every 97th day of eleven thousand years.
-TEST(DateText, IsThatOfTheStandardCalendar) {
-  using std::chrono::days;
-  using std::chrono::sys_days;
-  const sys_days first = sys_days(std::chrono::year(-999) / 1 / 1);
-  const sys_days last = sys_days(std::chrono::year(9999) / 12 / 31);
-  for (sys_days day = first; day <= last; day += days(97)) {
-    const std::chrono::year_month_day date(day);
-    const std::string expected = fmt::format("{:04}-{:02}-{:02}", static_cast<int>(date.year()),
-                                             static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()));
-    const std::int64_t count = day.time_since_epoch().count();
-    ASSERT_EQ(date_text(count, 1), expected);
-    ASSERT_EQ(date_text(count * 86'400'000 + 3'723'040, 86'400'000), expected + " 01:02:03.04");
+// The Gregorian calendar, counted year by year.
+TEST(DateText, IsThatOfTheGregorianCalendar) {
+  std::int64_t new_year = 0;  // days since 1970 on the first of January
+  for (int year = 1970; year < 9999; ++year) {
+    const bool is_leap = (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
+    const std::string of_year = fmt::format("{:04}", year);
+    ASSERT_EQ(date_text(new_year, 1), of_year + "-01-01");
+    ASSERT_EQ(date_text(new_year + 58, 1), of_year + "-02-28");
+    ASSERT_EQ(date_text(new_year + 59, 1), of_year + (is_leap ? "-02-29" : "-03-01"));
+    ASSERT_EQ(date_text((new_year + 181) * 86'400'000 + 3'723'040, 86'400'000),
+              of_year + (is_leap ? "-06-30" : "-07-01") + " 01:02:03.04");
+    new_year += is_leap ? 366 : 365;
+    ASSERT_EQ(date_text(new_year - 1, 1), of_year + "-12-31");
   }
+  EXPECT_EQ(date_text(-719'468, 1), "0000-03-01");
+  EXPECT_EQ(date_text(-719'469, 1), "0000-02-29");
+  EXPECT_EQ(date_text(std::numeric_limits<std::int32_t>::max(), 1), "day 2147483647 of 1970");
   EXPECT_EQ(date_text(-1, 86'400), "1969-12-31 23:59:59");
   EXPECT_EQ(date_text(std::numeric_limits<std::int64_t>::max(), 86'400'000'000'000), "2262-04-11 23:47:16.854775807");
 }
