@@ -201,6 +201,8 @@ TEST(FoundTerms, OfAnUnknownEffectHoldWhereRowsEnd) {
   EXPECT_EQ(added(fit, far.inputs.values), added(law, held));
   const Eigen::VectorXd code = of_compiled(folder, fit, far);
   EXPECT_LE(largest(code - added(law, held)), 1e-12 * largest(code));
+  const program::Outcome failed = folder.run("echo 1 nan 1 1 1 30 0 | ./correct");  // as of a sensor
+  EXPECT_NE(failed.out.find("nan"), std::string::npos) << failed.out;
 }
 
 TEST(ExpressionCode, KeepsTheOrderOfOperators) {

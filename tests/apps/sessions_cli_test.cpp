@@ -110,6 +110,24 @@ TEST(SessionsProgram, ATestFileOfAnotherSessionIsNoErrorOfTheArm) {
   EXPECT_EQ(folder.run(calibrate + " --new-session").exit_code, 0);
 }
 
+TEST(SessionsProgram, ATestFileThatTookPartIsSaid) {
+  const Folder folder;
+  write_arms(folder);
+  simulate(folder, "real.yaml", 60, 1, "a.csv");
+  simulate(folder, "real.yaml", 40, 2, "b.csv");
+  std::filesystem::copy_file(folder.file("a.csv"), folder.file("copy.csv"));
+  for (const std::string command : {"calibrate", "discover"}) {
+    const auto run = [&](const std::string& test) {
+      const std::string words = fmt::format("{} {} {}arm.yaml a.csv", robot_program, command, samples);
+      const Outcome outcome = folder.run(fmt::format("{} --test {} 2>&1", words, test));
+      return outcome.out + outcome.err;
+    };
+    const std::string same = run("copy.csv");
+    EXPECT_NE(same.find("60 of the 60 test readings stand among the measurements"), std::string::npos) << same;
+    EXPECT_EQ(run("b.csv").find("stand among"), std::string::npos);
+  }
+}
+
 TEST(SessionsProgram, ALimitIsPassedFailedOrNotEvaluated) {
   const Folder folder;
   write_arms(folder);

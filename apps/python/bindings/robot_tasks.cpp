@@ -29,6 +29,7 @@
 #include "report/robot/measurement_text.hpp"
 #include "report/robot/of_calibration.hpp"
 #include "report/robot/pose_report.hpp"
+#include "report/robot/provenance.hpp"
 
 namespace llmt::python {
 namespace {
@@ -46,19 +47,6 @@ nb::object page_of(bool wanted, const std::function<report::Document()>& documen
   const report::Document made = document();
   const std::string origin = fmt::format("{}. Made by LLMT {}.", made.title, LLMT_VERSION);
   return nb::cast(report::filled_page(report::empty_page(), made, origin));
-}
-
-// The record of a call, as record_of() of llmt.robotics writes it.
-robotics::Provenance provenance_of(const std::string& made_from) {
-  const report::Json json = report::Json::parse(made_from);
-  robotics::Provenance made{.program = json.at("program"), .date = json.at("date"), .sources = {}, .options = {}};
-  for (const report::Json& file : json.at("files")) {
-    made.sources.push_back({file.at("role"), file.at("name"), file.at("sha256")});
-  }
-  for (const report::Json& option : json.at("options")) made.options.push_back(option);
-  made.instrument = json.at("instrument");
-  made.serial_number = json.at("serial_number");
-  return made;
 }
 
 // A robot that a task made of another one.
@@ -113,7 +101,7 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
   if (!run->refusal.empty()) outcome.warn()(finding("not_converged", run->refusal));
   std::ranges::for_each(run->measurements.warnings, outcome.warn());
   std::ranges::for_each(run->input_mistakes, outcome.warn());
-  run->report.calibration.robot.calibration->made_from = provenance_of(made_from);
+  run->report.calibration.robot.calibration->made_from = report::provenance_of(report::Json::parse(made_from));
   const report::Document document = report::calibration_document(*run);
   nb::dict result = outcome.dict(report::document_text(document), report::calibration_json(*run, ""));
   result["document"] = report::to_json(document).dump(-1, ' ', false, report::Json::error_handler_t::replace);
@@ -163,23 +151,21 @@ nb::dict discover(const Arm& arm, const Source& measured, const std::optional<So
   } catch (const std::runtime_error& error) {
     throw refused(error.what(), outcome.warnings());
   }
-  if (auto& record = run->found.improved.robot.calibration) record->made_from = provenance_of(made_from);
+  if (auto& record = run->found.improved.robot.calibration)
+    record->made_from = report::provenance_of(report::Json::parse(made_from));
   nb::dict result = outcome.dict(report::discovery_text(*run, measured.first, report::no_width_limit, outcome.face()),
                                  report::discovery_run_json(*run));
   result["robot"] = arm_of(arm, run->found.improved);
   const std::vector<bool> set_aside = report::are_set_aside(*run);
   const auto errors_of = [&](const robotics::CorrectedRobot& robot, const Eigen::VectorXd& judging) {
     std::vector<double> errors = numbers_of(robotics::distances(robotics::positions(robot, judged->poses), *judged));
-    Eigen::Index next = 0;
-    for (std::size_t k = 0; k < set_aside.size(); ++k) {
-      if (set_aside[k]) errors[k] = judging(next++);
-    }
+    const double* next = judging.data();
+    for (std::size_t k = 0; k < set_aside.size(); ++k) errors[k] = set_aside[k] ? *next++ : errors[k];
     return errors;
   };
-  nb::dict errors;
-  errors["before"] = errors_of({run->found.before, {}}, run->found.held_out.before_mm);
-  errors["after"] = errors_of(run->found.improved, run->found.held_out.after_mm);
-  result["errors"] = errors;
+  result["errors"] = nb::dict();
+  result["errors"]["before"] = errors_of({run->found.before, {}}, run->found.held_out.before_mm);
+  result["errors"]["after"] = errors_of(run->found.improved, run->found.held_out.after_mm);
   result["set_aside"] = set_aside;
   result["page"] = page_of(page, [&] {
     return report::discovery_report(

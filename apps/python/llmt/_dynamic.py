@@ -105,7 +105,7 @@ class DynamicLocalLinearTreeRegressor:
                 float(dt),
                 "s",
                 self.lags,
-                self.delay or "",
+                self._dead_times(),
                 self._horizon(),
                 self.rest,
                 0 if self.n_jobs in (None, -1) else int(self.n_jobs or 0),
@@ -275,6 +275,11 @@ class DynamicLocalLinearTreeRegressor:
         if not hasattr(self, "_handle"):
             raise ValueError("this model is not fitted yet; call fit(u, y) first")
         return self._handle
+
+    def _dead_times(self) -> str:
+        if self.delay is None or isinstance(self.delay, str):
+            return self.delay or ""
+        raise TypeError(f"delay is {self.delay!r}, it must be a text such as 'u:3', 'auto', or None")
 
     def _horizon(self) -> int:
         if self.purpose == "simulation":

@@ -188,6 +188,7 @@ CalibrationRun run_calibration(const robotics::Robot& described, const robotics:
     run.input_mistakes.back().is_mistake = true;
   }
   if (run.test) {
+    if (const auto same = tests_that_took_part(measured, *run.test)) run.input_mistakes.push_back(*same);
     robotics::Poses used = run.test->poses;
     used.observations.clear();
     if (!run.test->poses.observations.empty()) used = select(used, robotics::position_rows(run.test->poses));

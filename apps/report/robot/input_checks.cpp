@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <set>
-
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -37,6 +36,27 @@ void check_frames(const std::string& file, const robotics::Robot& robot, const r
                                          measurements.lines[row], is_session ? "session" : "target",
                                          is_session ? base : observations[row].tool, advice));
   }
+}
+
+std::optional<Finding> tests_that_took_part(const robotics::Measurements& measurements,
+                                            const robotics::Measurements& test) {
+  const auto reading = [](const robotics::Measurements& of, Eigen::Index row) {
+    const auto joints = of.poses.joints.row(row);
+    const auto point = of.positions_mm.row(row);
+    std::vector<double> numbers(joints.begin(), joints.end());
+    numbers.insert(numbers.end(), point.begin(), point.end());
+    return numbers;
+  };
+  std::set<std::vector<double>> known;
+  for (Eigen::Index row = 0; row < measurements.count(); ++row) known.insert(reading(measurements, row));
+  Eigen::Index same = 0;
+  for (Eigen::Index row = 0; row < test.count(); ++row) same += known.contains(reading(test, row)) ? 1 : 0;
+  if (same == 0 || 2 * same < test.count()) return std::nullopt;
+  return finding(
+      "test_took_part",
+      fmt::format("{} of the {} test readings stand among the measurements: they took part, and what is said "
+                  "of them is no error on new poses",
+                  same, test.count()));
 }
 
 robotics::CorrectedRobot arm_alone(const std::string& file, robotics::CorrectedRobot robot, const Warn& warn) {

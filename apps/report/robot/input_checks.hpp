@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "llmt/finding.hpp"
@@ -22,6 +23,11 @@ void check_positions(const std::string& file, const robotics::Robot& robot, cons
 /// have. `advice` ends the message.
 void check_frames(const std::string& file, const robotics::Robot& robot, const robotics::Measurements& measurements,
                   const std::string& advice);
+
+/// A finding if half or more of the test readings stand among the measurements, number by number: they took part, and
+/// their error is no test.
+std::optional<Finding> tests_that_took_part(const robotics::Measurements& measurements,
+                                            const robotics::Measurements& test);
 
 /// The arm as it moves, for those who command it: without errors of the instrument or its session. `warn` gets their
 /// names. `file`: of the robot.

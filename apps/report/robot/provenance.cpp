@@ -17,6 +17,18 @@ Json provenance_json(const robotics::Provenance& made) {
   return json;
 }
 
+robotics::Provenance provenance_of(const Json& json) {
+  robotics::Provenance made{.program = json.at("program"), .date = json.at("date"), .sources = {}, .options = {}};
+  for (const Json& file : json.at("files")) {
+    made.sources.push_back({file.at("role"), file.at("name"), file.at("sha256")});
+  }
+  for (const Json& option : json.at("options")) made.options.push_back(option);
+  const auto text_of = [](const Json& stated) { return stated.is_null() ? std::string() : stated.get<std::string>(); };
+  made.instrument = text_of(json.at("instrument"));
+  made.serial_number = text_of(json.at("serial_number"));
+  return made;
+}
+
 std::vector<Section> provenance_section(const robotics::Robot& robot) {
   if (!robot.calibration || !robot.calibration->made_from) return {};
   const robotics::Provenance& made = *robot.calibration->made_from;

@@ -14,6 +14,9 @@ namespace llmt::report {
 /// The fields of robotics::Provenance under their names.
 Json provenance_json(const robotics::Provenance& made);
 
+/// The same read back. Throws Json::exception for what it does not write.
+robotics::Provenance provenance_of(const Json& json);
+
 /// A page's last section; nothing where the robot does not say.
 std::vector<Section> provenance_section(const robotics::Robot& robot);
 

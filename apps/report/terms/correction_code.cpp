@@ -104,8 +104,9 @@ std::string c_function(const Body& body) {
     text += fmt::format("  if (fabs({0}) < {1}) {0} = 0.0; /* at rest */\n", word, band);
   }
   for (const FoundTerms::Input& input : body.held) {
-    text += fmt::format("  {0} = fmin(fmax({0}, {1}), {2}); /* as far as it was seen */\n", input.word, input.low,
-                        input.high);
+    // What is not a number stays so.
+    text += fmt::format("  {0} = {0} < {1} ? {1} : {0} > {2} ? {2} : {0}; /* as far as it was seen */\n", input.word,
+                        input.low, input.high);
   }
   text += fmt::format("  double change = {};\n", body.adjusted.empty() ? "0.0" : body.adjusted);
   if (!body.adjusted.empty()) text += fmt::format("  {} += change;\n", body.arguments.back());

@@ -65,8 +65,8 @@ class ArrowTable {
 
 /// The text of a date or a moment that is counted from the beginning of 1970 in the proleptic Gregorian calendar:
 /// `2024-02-29`, and where it is not midnight `2024-02-29 12:00:00.5`. `per_day`: units of `count` in a day, 1 or a
-/// multiple of 86400. A moment with a zone of time is counted, and written, in UTC. Beyond the years -32767 ... 32767 the
-/// number of the day stands in the place of the date.
+/// multiple of 86400. A moment with a zone of time is counted, and written, in UTC. Beyond the years -32767 ... 32767
+/// the number of the day stands in the place of the date.
 std::string date_text(std::int64_t count, std::int64_t per_day);
 
 /// Whether a file begins as an Arrow file does. False for what is no regular file or cannot be read.

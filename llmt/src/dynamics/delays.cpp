@@ -62,7 +62,8 @@ std::vector<int> asked_delays(const Task& task, const std::vector<StretchFold>& 
   std::vector<int> found = delays;
   for (int& delay : found) delay = std::max(delay, 0);
   for (std::size_t i = 0; i < delays.size(); ++i) {
-    if (delays[i] != find_delay || lags.inputs[i].empty()) continue;
+    const bool never_changes = !(task.inputs[i].low < task.inputs[i].high);
+    if (delays[i] != find_delay || lags.inputs[i].empty() || never_changes) continue;
     Work part(work, 1.0 / static_cast<double>(delays.size()));
     const std::vector<double> errors = errors_of_delays(
         task, folds, task.horizon != 1, most,
@@ -72,8 +73,7 @@ std::vector<int> asked_delays(const Task& task, const std::vector<StretchFold>& 
           return delayed(lags, tried);
         },
         part);
-    double best = std::numeric_limits<double>::infinity();
-    for (const double error : errors) best = std::min(best, error);
+    const double best = std::ranges::min(errors);
     for (std::size_t delay = 0; delay < errors.size(); ++delay) {
       if (errors[delay] <= as_small * best) found[i] = static_cast<int>(delay);
     }

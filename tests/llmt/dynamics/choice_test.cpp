@@ -133,6 +133,24 @@ TEST(DynamicChoice, ADeadTimeIsFoundOrGiven) {
   EXPECT_THROW(llmt::fit_dynamic(series, options), std::invalid_argument);
 }
 
+// The errors of all dead times of an input that never changes are alike.
+TEST(DynamicChoice, AnInputThatNeverChangesHasNoDeadTime) {
+  Series series = systems::record(400, 17, systems::oscillator, 0.0);
+  llmt::Random random(18);
+  series.inputs.conservativeResize(Eigen::NoChange, 2);
+  series.input_names = {"u", "c"};
+  for (Eigen::Index row = 0; row < 400; ++row) {
+    const double before = row > 0 ? series.outputs(row - 1, 0) : 0.0;
+    series.outputs(row, 0) = 0.8 * before + (row >= 4 ? 0.5 * series.inputs(row - 4, 0) : 0.0) + 0.01 * random.normal();
+    series.inputs(row, 1) = 5.0;
+  }
+  llmt::DynamicOptions options;
+  options.rest = llmt::RestLearner::none;
+  options.lags = llmt::Lags{{{1}}, {{1}, {1}}};
+  options.delays = {llmt::find_delay, llmt::find_delay};
+  EXPECT_EQ(llmt::fit_dynamic(series, options).summary.delays, (std::vector<int>{3, 0}));
+}
+
 TEST(DynamicChoice, DeadTimesAreReadWithTheirInputs) {
   EXPECT_EQ(llmt::parse_delays("v:3", {"u", "v"}, llmt::find_delay), (std::vector<int>{-1, 3}));
   EXPECT_EQ(llmt::parse_delays("v:3,u:0", {"u", "v"}, 9), (std::vector<int>{0, 3}));

@@ -64,7 +64,7 @@ def record_of(task: Callable[..., Any], given: Mapping[str, Any], sources: Mappi
             "date": _today(),
             "files": files,
             "options": options,
-            "instrument": given["instrument"],
-            "serial_number": given["serial_number"],
+            "instrument": str(given["instrument"] or ""),
+            "serial_number": str(given["serial_number"] or ""),
         }
     )

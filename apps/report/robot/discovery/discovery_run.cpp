@@ -93,6 +93,7 @@ DiscoveryRun run_discovery(const robotics::Robot& described, const robotics::Mea
   check_positions(task.robot_file, run.robot, measured.poses);
   if (test) check_positions(task.robot_file, run.robot, test->poses);
   std::ranges::for_each(measured.warnings, warn);
+  if (const auto same = test ? tests_that_took_part(measured, *test) : std::nullopt) warn(*same);
   const std::optional<robotics::Suspicion> suspicion = robotics::likely_mistake(run.robot, measured);
   if (suspicion && suspicion->name != task.accept_suspicion) {
     Finding mistake = finding("likely_mistake", suspicion->sentence);
