@@ -4,8 +4,8 @@
     python3 bench/robots/names_by_seed.py --program build/release/bin/llmt-robot --cases cases --seeds 10
 
 Each case is searched with every seed. Printed are the names that some seed confirms, how many of them not every seed
-confirms, the probability that two seeds differ in one, and how many confirmed names are effects of the arm, by the truth
-of the case, which the program does not see.
+confirms, the probability that two seeds differ in one, and how many confirmed names are effects of the arm, by the
+truth of the case, which the program does not see.
 """
 
 import argparse
@@ -17,12 +17,12 @@ from pathlib import Path
 
 
 def found(program, case, seed):
-    """Names and whether they are confirmed; nothing where the program refuses the case."""
+    """Names, with their families, and whether they are confirmed; nothing where the program refuses the case."""
     words = [program, "discover", case / "robot.yaml", case / "measured.csv", "--seed", seed, "--json"]
     done = subprocess.run([str(word) for word in words], capture_output=True, text=True)
     if done.returncode != 0:
         return None
-    return {(of["name"], of["location"]): of["confirmed"] for of in json.loads(done.stdout)["effects"]}
+    return {(of["name"], of["family"], of["location"]): of["confirmed"] for of in json.loads(done.stdout)["effects"]}
 
 
 def true_names(case):
@@ -49,7 +49,7 @@ def main():
         runs += len(own)
         for answer in own:
             of_runs += sum(answer.values())
-            right += sum(yes and name in truth for name, yes in answer.items())
+            right += sum(yes and name[1:] in truth for name, yes in answer.items())
         for name in {name for answer in own for name in answer}:
             count = sum(answer.get(name, False) for answer in own)
             if count == 0:

@@ -117,7 +117,7 @@ std::optional<Objection> judge_instrument(const Robot& robot, const Searched& ju
 Discovery discover_readings(const Robot& robot, const Measurements& measurements,
                             const std::optional<Measurements>& test, const DiscoveryOptions& given, Work& work) {
   DiscoveryOptions options = given;
-  options.seed = 1;
+  options.seed = 1;  // that of `given` deals the poses set aside, and nothing else
   const auto answer_without = [&](double share) {
     const auto split_with = [&](Repeats repeats) { return set_aside(measurements, test, share, given.seed, repeats); };
     return searched_poses(robot, split_with, options, work);
