@@ -155,3 +155,12 @@ def test_a_dead_time_is_found() -> None:
     assert model.lags_ == "y:1,u:6" and model.summary_["delays"] == [5]
     with pytest.raises(ValueError, match="delay"):
         DynamicLocalLinearTreeRegressor(lags="y:1,u:1", delay="u").fit(u, y)
+
+
+def test_dead_times_are_texts_and_shown() -> None:
+    model = DynamicLocalLinearTreeRegressor(lags="y:1,u:1", delay="u:3")
+    assert repr(model) == (
+        "DynamicLocalLinearTreeRegressor(lags='y:1,u:1', delay='u:3', purpose='simulation', rest='auto')"
+    )
+    with pytest.raises(TypeError, match="delay is 3, it must be a text such as 'u:3', 'auto', or None"):
+        DynamicLocalLinearTreeRegressor(delay=3).fit(np.arange(50.0), np.arange(50.0))

@@ -269,7 +269,9 @@ class DynamicLocalLinearTreeRegressor:
         return text
 
     def __repr__(self) -> str:
-        return f"DynamicLocalLinearTreeRegressor(lags={self.lags!r}, purpose={self.purpose!r}, rest={self.rest!r})"
+        given = {"lags": self.lags, "delay": self.delay, "purpose": self.purpose, "rest": self.rest}
+        words = ", ".join(f"{name}={value!r}" for name, value in given.items() if value is not None)
+        return f"DynamicLocalLinearTreeRegressor({words})"
 
     def _model(self) -> Any:
         if not hasattr(self, "_handle"):
