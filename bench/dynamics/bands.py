@@ -8,12 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from systems import System, write
-
-
-def noisy(system: System, clean: list[list[float]], spread: list[float]) -> list[list[float]]:
-    """Measured outputs: two per cent of the deviation is noise."""
-    return [[v + 0.02 * s * system.random.gauss(0, 1) for v, s in zip(row, spread, strict=True)] for row in clean]
+from systems import System, noisy, write
 
 
 def shares(run: dict, names: list[str], measured: list[list[float]], rows: int) -> tuple[list[bool], list[bool]]:

@@ -100,6 +100,11 @@ def linear_error(u, noisy, test_u, test_y, lag=2) -> list[float]:
     return [math.sqrt(s / (len(test_u) - lag)) for s in squares]
 
 
+def noisy(system: "System", clean: list[list[float]], spread: list[float]) -> list[list[float]]:
+    """Measured outputs: two per cent of the deviation is noise."""
+    return [[v + 0.02 * s * system.random.gauss(0, 1) for v, s in zip(row, spread, strict=True)] for row in clean]
+
+
 def write(path: Path, u, outputs) -> None:
     names = ["y", "q"][: len(outputs[0])]
     lines = [",".join(["u", *names])] + [",".join(map(repr, [a, *row])) for a, row in zip(u, outputs, strict=True)]
@@ -121,9 +126,9 @@ def main() -> None:
             system = System(seed)
             u, clean = system.run(system.rows, seed)
             spread = [statistics.pstdev(row[o] for row in clean) for o in range(len(clean[0]))]
-            noisy = [[v + 0.02 * s * system.random.gauss(0, 1) for v, s in zip(row, spread, strict=True)] for row in clean]
+            seen = noisy(system, clean, spread)
             test_u, test_y = system.run(10 * system.rows, seed + 100_000)
-            write(folder / "train.csv", u, noisy)
+            write(folder / "train.csv", u, seen)
             write(folder / "test.csv", test_u, test_y)
             targets = "y,q" if system.kind == "coupled" else "y"
             lags = arguments.lags
@@ -137,7 +142,7 @@ def main() -> None:
             run = json.loads(done.stdout)
             runs_away = run["records"][0]["leaves_bounds_at"] is not None
             errors = [value if value is not None else math.inf for value in run["errors"]["rmse"]]
-            linear = linear_error(u, noisy, test_u, test_y)
+            linear = linear_error(u, seen, test_u, test_y)
             ratio = math.sqrt(sum((e / s) ** 2 for e, s in zip(errors, spread, strict=True))
                               / sum((e / s) ** 2 for e, s in zip(linear, spread, strict=True)))
             left += runs_away

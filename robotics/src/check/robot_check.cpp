@@ -54,13 +54,11 @@ double mean_distance(double noise_mm, const Measurements& measurements) {
   return noise_mm * factors[std::ranges::count(measurements.measured, true) - 1];
 }
 
-void set_limit(const CorrectedRobot& corrected, const Measurements& measurements, const CheckOptions& options,
-               RobotCheck& result) {
+void set_limit(const Robot& robot, const Measurements& measurements, const CheckOptions& options, RobotCheck& result) {
   if (options.accuracy_mm) {
     result.accuracy_mm = result.limit_mm = *options.accuracy_mm;
     return;
   }
-  const Robot& robot = corrected.robot;
   require(
       robot.calibration.has_value(),
       "the description does not say how accurate it was: accuracy_mm is needed, or a calibration of today's format");
@@ -71,14 +69,10 @@ void set_limit(const CorrectedRobot& corrected, const Measurements& measurements
   const bool is_alike = axes == 3 ? had_three : !had_three && record.coordinates == axes * record.poses;
   const bool has_error = record.held_out_mm && is_alike;
   result.accuracy_is_of_noise = !has_error;
-  const double of_noise = mean_distance(record.noise_mm, measurements);
-  result.accuracy_mm = has_error ? *record.held_out_mm : of_noise;
-  // Few poses left out may by chance be better than those that were fitted. A correction lowers the error of both, and
-  // the noise is that of the geometry alone.
-  if (has_error && !corrected.correction) result.accuracy_mm = std::max(result.accuracy_mm, of_noise);
+  result.accuracy_mm = has_error ? *record.held_out_mm : mean_distance(record.noise_mm, measurements);
   constexpr double share_of_mean = 0.422;  // standard deviation of a normal vector's length over its mean
-  const double least_spread = share_of_mean * result.accuracy_mm;
-  const double spread = has_error ? std::max(least_spread, record.held_out_sd_mm.value_or(0.0)) : least_spread;
+  const double of_noise = share_of_mean * result.accuracy_mm;
+  const double spread = has_error ? record.held_out_sd_mm.value_or(of_noise) : of_noise;
   const Eigen::Index poses = has_error && record.held_out_poses > 0 ? record.held_out_poses : record.poses;
   const double error =
       spread * std::sqrt(1.0 / static_cast<double>(measurements.count()) + 1.0 / static_cast<double>(poses));
@@ -89,7 +83,7 @@ void set_limit(const CorrectedRobot& corrected, const Measurements& measurements
 
 RobotCheck check_all(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options) {
   RobotCheck result;
-  set_limit(robot, measurements, options, result);
+  set_limit(robot.robot, measurements, options, result);
   const CalibrationRecord* record = robot.robot.calibration ? &*robot.robot.calibration : nullptr;
   result.has_correlations = record != nullptr && record->correlations.size() > 0;
   const CorrectedRobot judged = as_set_up(robot, measurements, options);

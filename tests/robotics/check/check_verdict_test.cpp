@@ -115,18 +115,21 @@ TEST(CheckVerdict, BadReadingsOfTheCalibrationDoNotRaiseTheLimit) {
   }
 }
 
-// A search sets few poses aside, and their mean may by chance be far below that of other poses.
+// A search sets few poses aside, and their mean may by chance be far below that of other poses. One check in a hundred
+// may fail; counting all poses of the calibration in the place of those left out it was five.
 TEST(CheckVerdict, FewPosesLeftOutMakeNoFalseAlarm) {
   int alarms = 0;
-  for (std::uint64_t draw = 1; draw <= 2 * draws; ++draw) {
+  for (std::uint64_t draw = 1; draw <= draws / 4; ++draw) {
     CorrectedRobot robot = calibrated(draw);
-    const Measurements aside = measured(arm(), 12, 900 + draw);
-    remember_errors(*robot.robot.calibration, distances(positions(robot.robot, aside.poses), aside));
-    EXPECT_EQ(robot.robot.calibration->held_out_poses, 12);
-    const RobotCheck check = check_robot(robot, measured(another_day(arm()), 15, 2000 + draw));
-    alarms += check.verdict == CheckVerdict::no_longer_good ? 1 : 0;
+    for (std::uint64_t again = 1; again <= draws; ++again) {
+      const Measurements aside = measured(arm(), 12, 1000 * draw + again);
+      remember_errors(*robot.robot.calibration, distances(positions(robot.robot, aside.poses), aside));
+      EXPECT_EQ(robot.robot.calibration->held_out_poses, 12);
+      const RobotCheck check = check_robot(robot, measured(another_day(arm()), 40, 50'000 + 1000 * draw + again));
+      alarms += check.verdict == CheckVerdict::no_longer_good ? 1 : 0;
+    }
   }
-  EXPECT_LE(alarms, 3);  // one in a hundred; more than three of 80: one in a hundred
+  EXPECT_LE(alarms, 9);  // of 400: 4 are expected, and more than 9 in one of a hundred such tests
 }
 
 }  // namespace
