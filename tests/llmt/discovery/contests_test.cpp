@@ -238,6 +238,40 @@ std::vector<std::string> left_out_for(const Log& log, const Missing& found, cons
   return all;
 }
 
+// What stands where a search finds `other` beside `found`.
+std::vector<std::string> families_after(const Log& log, const Missing& found, const Missing& other) {
+  const Recording recording(log.inputs);
+  const CrossValidation validation(log.simulation, recording, log.measured, log.terms, {.fewest_samples = rows}, {});
+  const Missing after = contested(found, log.terms, terms_of_regimes(log.terms), validation,
+                                  [&](const std::vector<ModelTerm>&, const std::set<std::size_t>&) { return other; });
+  std::vector<std::string> families;
+  for (const FoundTerm& term : after.found) families.push_back(term.family);
+  return families;
+}
+
+TEST(Contests, TermsStandInThePlaceOfAShapeIfTheyAreCertain) {
+  const Log log;
+  using Families = std::vector<std::string>;
+  const auto smooth = std::ranges::find_if(log.terms, [](const ModelTerm& term) {
+    return term.generic && term.inputs == std::vector<std::string>{"x"} && term.constants.empty();
+  });
+  ASSERT_NE(smooth, log.terms.end());
+  Missing shape = log.answer({smooth->family});
+  shape.answer = Answer::unknown;
+  shape.found[0].confirmed = false;
+  shape.gaps[0].known_noise = noise;  // nothing is left for regimes
+  shape.found[0].coefficients = Eigen::VectorXd::Ones(std::ssize(smooth->coefficients));
+  Missing terms = log.answer({"square", "linear"});
+  EXPECT_EQ(families_after(log, shape, terms), (Families{"square", "linear"}));
+  terms.found[0].confirmed = false;
+  EXPECT_EQ(families_after(log, shape, terms), Families{smooth->family});
+  // A term that leaves much more does not, nor do no terms at all.
+  EXPECT_EQ(families_after(log, shape, log.answer({"offset"})), Families{smooth->family});
+  Missing none = log.answer({});
+  none.answer = Answer::nothing_missing;
+  EXPECT_EQ(families_after(log, shape, none), Families{smooth->family});
+}
+
 TEST(Contests, EachAppliesToWhatItLeavesOut) {
   const Log log;
   using Searches = std::vector<std::string>;
@@ -250,6 +284,9 @@ TEST(Contests, EachAppliesToWhatItLeavesOut) {
   Missing of_state = log.answer({"delay"});
   of_state.answer = Answer::inner_state;
   EXPECT_EQ(left_out_for(log, of_state), (Searches{all, "delay "}));
+
+  const std::string shape = std::ranges::find_if(log.terms, &ModelTerm::generic)->family;
+  EXPECT_EQ(left_out_for(log, log.answer({"square", shape}), regimes)[0], "shapes regimes ");
 
   // Something is left: regimes are no longer left out.
   Missing unknown = log.answer({"square"});

@@ -200,6 +200,12 @@ std::optional<Others> states(const Missing& found, const Terms& terms, const Lef
   return Others{terms, with(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); })};
 }
 
+// A shape has so many numbers that it explains more than the term that acts, noise and outliers among it.
+std::optional<Others> shapes(const Missing& found, const Terms& terms, const Left& refuted) {
+  if (!has_shapes(found)) return std::nullopt;
+  return Others{terms, with(refuted, terms, [](const ModelTerm& term) { return term.generic; })};
+}
+
 std::optional<Others> constants(const Missing& found, const Terms& terms, const Left& refuted) {
   std::set<std::vector<std::string>> places;
   for (const FoundTerm& term : found.found) {
@@ -276,14 +282,21 @@ double cost_of_choice(const Missing& answer, const Terms& terms) {
 struct Contest {
   const char* name;
   OthersOf others;
+  bool (*may_win)(const Missing& other);
 };
 
+bool any_answer(const Missing&) { return true; }
+
+// Terms in the place of a shape are a name for it only where they are certain.
+bool names(const Missing& other) { return !other.found.empty() && is_certain(other); }
+
 // Regimes last, because they are tried where everything else leaves something.
-constexpr std::array<Contest, 5> contests = {{{"no terms", all},
-                                              {"no states", states},
-                                              {"no searched constants", constants},
-                                              {"regimes", plain_regimes},
-                                              {"terms of these regimes", same_regimes}}};
+constexpr std::array<Contest, 6> contests = {{{"no terms", all, any_answer},
+                                              {"no states", states, any_answer},
+                                              {"no shapes", shapes, names},
+                                              {"no searched constants", constants, any_answer},
+                                              {"regimes", plain_regimes, any_answer},
+                                              {"terms of these regimes", same_regimes, any_answer}}};
 
 }  // namespace
 
@@ -324,7 +337,8 @@ Missing contested(Missing found, const Terms& terms, const Left& refuted, const 
     if (!others) continue;
     Missing other = search(others->terms, others->left_out);
     const bool competes = other.answer != Answer::failed_held_out && beyond_constants(other, terms).empty() &&
-                          !(has_shapes(other) && !has_shapes(found)) && !has_same_terms(found, other);
+                          !(has_shapes(other) && !has_shapes(found)) && !has_same_terms(found, other) &&
+                          contest.may_win(other);
     if (!competes) continue;
     Eigen::VectorXd floors(std::ssize(found.gaps));
     for (std::size_t o = 0; o < found.gaps.size(); ++o) {
