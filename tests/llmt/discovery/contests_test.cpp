@@ -283,7 +283,7 @@ TEST(Contests, EachAppliesToWhatItLeavesOut) {
 
   Missing of_state = log.answer({"delay"});
   of_state.answer = Answer::inner_state;
-  EXPECT_EQ(left_out_for(log, of_state), (Searches{all, "delay "}));
+  EXPECT_EQ(left_out_for(log, of_state), (Searches{"delay ", all}));
 
   const std::string shape = std::ranges::find_if(log.terms, &ModelTerm::generic)->family;
   EXPECT_EQ(left_out_for(log, log.answer({"square", shape}), regimes)[0], "shapes regimes ");

@@ -291,8 +291,8 @@ bool any_answer(const Missing&) { return true; }
 bool names(const Missing& other) { return !other.found.empty() && is_certain(other); }
 
 // Regimes last, because they are tried where everything else leaves something.
-constexpr std::array<Contest, 6> contests = {{{"no terms", all, any_answer},
-                                              {"no states", states, any_answer},
+constexpr std::array<Contest, 6> contests = {{{"no states", states, any_answer},
+                                              {"no terms", all, any_answer},
                                               {"no shapes", shapes, names},
                                               {"no searched constants", constants, any_answer},
                                               {"regimes", plain_regimes, any_answer},
