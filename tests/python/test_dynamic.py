@@ -1,11 +1,14 @@
 """Models of systems that move, beside the program and compiled C."""
 
+import copy
 import json
+import pickle
 import shutil
 import subprocess
 
 import numpy as np
 import pytest
+import sklearn.base
 
 from llmt import DynamicLocalLinearTreeRegressor
 
@@ -164,3 +167,18 @@ def test_dead_times_are_texts_and_shown() -> None:
     )
     with pytest.raises(TypeError, match="delay is 3, it must be a text such as 'u:3', 'auto', or None"):
         DynamicLocalLinearTreeRegressor(delay=3).fit(np.arange(50.0), np.arange(50.0))
+
+
+def test_copies_are_the_same_model() -> None:
+    u, y = spring(300, 10)
+    model = DynamicLocalLinearTreeRegressor(lags="y:1-2,u:1", rest="none").fit(u, y, dt=0.05)
+    for copied in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model)):
+        np.testing.assert_array_equal(copied.simulate(u, y[:2]), model.simulate(u, y[:2]))
+        assert str(copied) == str(model) and copied.summary_ == model.summary_ and copied.lags_ == "y:1-2,u:1"
+    fresh = sklearn.base.clone(model)
+    assert fresh.get_params() == model.get_params()
+    with pytest.raises(ValueError, match="not fitted"):
+        fresh.simulate(u, y[:2])
+    assert fresh.set_params(rest="auto", n_jobs=1).rest == "auto"
+    with pytest.raises(ValueError, match="no parameter 'leaves'; there are lags, delay"):
+        fresh.set_params(leaves=3)

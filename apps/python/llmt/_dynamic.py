@@ -12,6 +12,9 @@ from ._progress import Bar
 from ._regressor import share
 
 
+_PARAMETERS = ("lags", "delay", "purpose", "rest", "n_jobs")
+
+
 class DynamicLocalLinearTreeRegressor:
     """A model of a system that moves, learned from records and chosen by free runs on stretches that are held out.
 
@@ -96,7 +99,7 @@ class DynamicLocalLinearTreeRegressor:
         if dt is None:
             dt = _step_of(y, begins)
         with Bar() as bar:
-            self._fitted = _core.fit_system(
+            fitted = _core.fit_system(
                 inputs,
                 outputs,
                 input_names,
@@ -111,10 +114,11 @@ class DynamicLocalLinearTreeRegressor:
                 0 if self.n_jobs in (None, -1) else int(self.n_jobs or 0),
                 bar,
             )
-        self._handle = self._fitted.model()
-        self.summary_: dict[str, Any] = json.loads(self._fitted.summary("series"))
-        self.simulated_: np.ndarray = self._fitted.simulated()
-        self.held_out_: np.ndarray = self._fitted.held_out()
+        self._handle = fitted.model()
+        self._text: str = fitted.text("series", 100)
+        self.summary_: dict[str, Any] = json.loads(fitted.summary("series"))
+        self.simulated_: np.ndarray = fitted.simulated()
+        self.held_out_: np.ndarray = fitted.held_out()
         return self
 
     def simulate(self, u: Any, y0: Any) -> np.ndarray:
@@ -263,13 +267,33 @@ class DynamicLocalLinearTreeRegressor:
         raise ValueError("to_sql: a system that moves has a state, which a SELECT has not; to_c writes it as C")
 
     def __str__(self) -> str:
-        if not hasattr(self, "_fitted"):
-            return repr(self)
-        text: str = self._fitted.text("series", 100)
-        return text
+        return getattr(self, "_text", repr(self))
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """The parameters, as scikit-learn's ``clone`` takes them."""
+        return {name: getattr(self, name) for name in _PARAMETERS}
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Sets parameters by their names; the fitted model stays until the next `fit`."""
+        for name, value in parameters.items():
+            if name not in _PARAMETERS:
+                raise ValueError(f"set_params: there is no parameter {name!r}; there are {', '.join(_PARAMETERS)}")
+            setattr(self, name, value)
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = self.__dict__.copy()
+        if "_handle" in state:
+            state["_handle"] = state["_handle"].to_json()
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if "_handle" in state:
+            self._handle = _core.DynamicModel.parse(state["_handle"], "the pickled model")
 
     def __repr__(self) -> str:
-        given = {"lags": self.lags, "delay": self.delay, "purpose": self.purpose, "rest": self.rest}
+        given = {name: getattr(self, name) for name in _PARAMETERS if name != "n_jobs"}
         words = ", ".join(f"{name}={value!r}" for name, value in given.items() if value is not None)
         return f"DynamicLocalLinearTreeRegressor({words})"
 

@@ -32,6 +32,10 @@ enum class RestLearner {
 /// In place of a dead time in DynamicOptions::delays: it is found.
 inline constexpr int find_delay = -1;
 
+/// In place of a dead time in DynamicSummary::delays: a linear model is as good without the input, with every dead time
+/// that was tried. Its lags have none.
+inline constexpr int no_delay_helps = -1;
+
 struct DynamicOptions {
   std::optional<Lags> lags = {};  ///< none: chosen on held-out stretches
   /// Dead time of each input in rows: its lags count from there. find_delay: found on held-out stretches, up to 40

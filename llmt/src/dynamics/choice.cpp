@@ -209,7 +209,7 @@ Chosen choose(Task& task, const std::vector<Stretch>& stretches, const DynamicOp
     asked = asked_delays(task, folds, of_linear, options.delays, rows, delaying);
   }
   if (options.lags) {
-    lags = {asked.empty() ? *options.lags : delayed(*options.lags, asked)};
+    lags = {asked.empty() ? *options.lags : delayed(*options.lags, without_marks(asked))};
   } else {
     Work finding(work, 0.1);
     Work summing(finding, 0.2);
@@ -218,7 +218,7 @@ Chosen choose(Task& task, const std::vector<Stretch>& stretches, const DynamicOp
     if (task.horizon != 1) sums = find_sums(task, searched, folds, summing);
     std::vector<int> delays = no_delays(task);
     if (asked.empty()) delays = find_delays(task, folds, task.horizon != 1, delaying);
-    for (std::size_t i = 0; i < asked.size(); ++i) delays[i] = delays[i] < 0 ? -1 : asked[i];
+    for (std::size_t i = 0; i < asked.size(); ++i) delays[i] = delays[i] < 0 ? -1 : std::max(asked[i], 0);
     lags = lag_candidates(delays, std::ssize(task.outputs), rows);
     // A linear model finds no delay where the system is far from linear: one row at most is tried too.
     std::vector<int> short_delays = delays;

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "dynamics/choice.hpp"
+#include "dynamics/delays.hpp"
 #include "dynamics/held_out_runs.hpp"
 #include "dynamics/model_structure.hpp"
 #include "dynamics/windows.hpp"
@@ -81,9 +82,8 @@ DynamicFit fit_dynamic(const Series& series, const DynamicOptions& options, cons
   Eigen::Index memory = 0;
   if (options.lags) {
     Lags lags = *options.lags;
-    std::vector<int> given = options.delays;
+    std::vector<int> given = without_marks(options.delays);
     given.resize(lags.inputs.size(), 0);
-    for (int& delay : given) delay = std::max(delay, 0);
     lags = delayed(std::move(lags), given);
     check_lags(lags);
     memory = longest_lag(lags);
@@ -94,9 +94,10 @@ DynamicFit fit_dynamic(const Series& series, const DynamicOptions& options, cons
   Eigen::Index rows = 0;
   for (const Stretch& stretch : stretches) rows += stretch.rows();
   if (rows < std::max(fewest_dynamic_rows, 10 * memory)) {
-    throw std::invalid_argument(
-        fmt::format("llmt::fit_dynamic: {} complete rows in stretches longer than the lags, {} are needed", rows,
-                    std::max(fewest_dynamic_rows, 10 * memory)));
+    const std::string where =
+        memory > 0 ? fmt::format("lags reach {} rows back, and in stretches longer than that ", memory) : "";
+    throw std::invalid_argument(fmt::format("llmt::fit_dynamic: {}there are {} complete rows; {} are needed", where,
+                                            rows, std::max(fewest_dynamic_rows, 10 * memory)));
   }
   Task task = task_of(series, options);
   for (std::size_t o = 0; o < task.outputs.size(); ++o) {

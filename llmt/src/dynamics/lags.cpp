@@ -1,10 +1,13 @@
 #include "llmt/lags.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
 #include <stdexcept>
+
+#include "llmt/names.hpp"
 
 namespace llmt {
 namespace {
@@ -21,6 +24,11 @@ int lag_from(std::string_view text, std::string_view part) {
   }
   if (lag > most_lag) refuse_part(part, fmt::format("a lag is at most {}", most_lag));
   return lag;
+}
+
+std::string no_such(const char* what, std::string_view name, const std::vector<std::string>& names) {
+  return fmt::format("there is no {} \"{}\"{}; there are {}", what, name, did_you_mean(name, names),
+                     fmt::join(names, ", "));
 }
 
 // "1,2,3,5" as "1-3,5" with the name before each.
@@ -55,7 +63,11 @@ Lags parse_lags(std::string_view text, const std::vector<std::string>& inputs,
     if (last < first) refuse_part(part, "the range ends before it begins");
     const auto output = std::ranges::find(outputs, name);
     const auto input = std::ranges::find(inputs, name);
-    if (output == outputs.end() && input == inputs.end()) refuse_part(part, "there is no such input or output");
+    if (output == outputs.end() && input == inputs.end()) {
+      std::vector<std::string> all = outputs;
+      all.insert(all.end(), inputs.begin(), inputs.end());
+      refuse_part(part, no_such("input or output", name, all));
+    }
     std::vector<int>& list =
         output != outputs.end() ? lags.outputs[output - outputs.begin()] : lags.inputs[input - inputs.begin()];
     if (output != outputs.end() && first == 0) refuse_part(part, "lags of outputs begin at 1");
@@ -96,7 +108,7 @@ std::vector<int> parse_delays(std::string_view text, const std::vector<std::stri
       refuse(part, fmt::format("auto, or INPUT:ROWS with 0 to {} rows is needed, such as u:3", most_lag));
     }
     const auto input = std::ranges::find(inputs, part.substr(0, colon));
-    if (input == inputs.end()) refuse(part, "there is no such input");
+    if (input == inputs.end()) refuse(part, no_such("input", part.substr(0, colon), inputs));
     const auto place = static_cast<std::size_t>(input - inputs.begin());
     if (named[place]) refuse(part, "the input has a delay already");
     named[place] = true;

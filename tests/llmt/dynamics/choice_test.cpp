@@ -151,6 +151,29 @@ TEST(DynamicChoice, AnInputThatNeverChangesHasNoDeadTime) {
   EXPECT_EQ(llmt::fit_dynamic(series, options).summary.delays, (std::vector<int>{3, 0}));
 }
 
+// u acts after four rows, v not at all, w after more rows than are tried.
+TEST(DynamicChoice, AnInputThatDoesNothingHasNoDeadTime) {
+  constexpr Eigen::Index rows = 600;
+  Series series = systems::record(rows, 19, systems::oscillator, 0.0);
+  llmt::Random random(20);
+  series.inputs.conservativeResize(Eigen::NoChange, 3);
+  series.input_names = {"u", "v", "w"};
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    series.inputs(row, 1) = row % 3 == 0 || row == 0 ? random.normal() : series.inputs(row - 1, 1);
+    series.inputs(row, 2) = random.normal();
+    const double before = row > 0 ? series.outputs(row - 1, 0) : 0.0;
+    series.outputs(row, 0) = 0.8 * before + (row >= 5 ? 0.5 * series.inputs(row - 5, 0) : 0.0) +
+                             (row >= 60 ? 0.02 * series.inputs(row - 60, 2) : 0.0) + 0.01 * random.normal();
+  }
+  llmt::DynamicOptions options;
+  options.rest = llmt::RestLearner::none;
+  options.lags = llmt::Lags{{{1}}, {{1}, {1}, {1}}};
+  options.delays = {llmt::find_delay, llmt::find_delay, llmt::find_delay};
+  const llmt::DynamicFit fit = llmt::fit_dynamic(series, options);
+  EXPECT_EQ(fit.summary.delays, (std::vector<int>{4, llmt::no_delay_helps, llmt::no_delay_helps}));
+  EXPECT_EQ(fit.model.parts().lags.inputs, (std::vector<std::vector<int>>{{5}, {1}, {1}}));
+}
+
 TEST(DynamicChoice, DeadTimesAreReadWithTheirInputs) {
   EXPECT_EQ(llmt::parse_delays("v:3", {"u", "v"}, llmt::find_delay), (std::vector<int>{-1, 3}));
   EXPECT_EQ(llmt::parse_delays("v:3,u:0", {"u", "v"}, 9), (std::vector<int>{0, 3}));
