@@ -13,6 +13,7 @@ struct BoostArguments {
   LearningArguments learning;
   std::string output;
   bool json = false;
+  int seeds = 1;
 };
 
 /// Fits a sum of trees. `command`: to refuse options of `llmt fit` that are for one tree.

@@ -30,7 +30,7 @@ TREE = {
     "n_jobs": 2,
 }
 FEW_FOLDS = {"cv": 3}  # of the trees, where the number of folds is not what is changed: fits take half of the time
-SUM = {"learning_rate": 0.3, "max_iter": 4, "categorical_features": ["d"], "random_state": 7, "n_jobs": 2}
+SUM = {"learning_rate": 0.3, "max_iter": 4, "seeds": 2, "categorical_features": ["d"], "random_state": 7, "n_jobs": 2}
 WITHOUT_EFFECT = {"n_jobs"}  # the result does not depend on the number of threads
 
 

@@ -28,11 +28,15 @@ inline constexpr Eigen::Index fewest_boosted_rows = 10;
 /// least 50: each takes 7 bytes a row.
 inline constexpr int most_boosted_levels = 255;
 
+/// Of BoostOptions::seeds.
+inline constexpr int most_seeds = 100;
+
 struct BoostOptions {
   /// Factor on every tree. 0: 0.1 where the trees are soft, else that of the table at fit_boosted().
   double rate = 0.0;
   int max_rounds = 2000;     ///< trees of an output at most, before the sum is fitted to all rows
   std::uint64_t seed = 1;    ///< of the rows that are held out, and of the features that a split looks at
+  int seeds = 1;             ///< the sum is the mean of this many, whose splits look at other features each
   int max_threads = 0;       ///< 0: all that the machine has. The result does not depend on it
   bool mean_of_few = false;  ///< of fewer than `fewest_boosted_rows` different rows: their mean, in place of an error
 };
@@ -41,10 +45,11 @@ struct BoostOptions {
 template <class Options, class Visitor>
 requires std::is_same_v<std::remove_const_t<Options>, BoostOptions>
 void for_each_field(Options& options, Visitor&& visit) {
-  auto& [rate, max_rounds, seed, max_threads, mean_of_few] = options;
+  auto& [rate, max_rounds, seed, seeds, max_threads, mean_of_few] = options;
   visit("rate", rate);
   visit("max_rounds", max_rounds);
   visit("seed", seed);
+  visit("seeds", seeds);
   visit("max_threads", max_threads);
   visit("mean_of_few", mean_of_few);
 }
@@ -94,6 +99,9 @@ struct BoostResult {
 /// held out in turn, the sum is a weighted mean of two variants and one tree, as fit() makes it; its error is that of
 /// the whole procedure, shares and number of trees chosen without the row. With more rows it is the mean of the sum and
 /// such a tree where the tree alone is better than the sum on the held-out rows.
+///
+/// The mean of several seeds has the error of the mean: all hold out the same rows. Its other figures are means, and
+/// the variants those of the first seed.
 ///
 /// BoostedModel::intervals() gives intervals, from the held-out rows' residuals and their spread.
 ///

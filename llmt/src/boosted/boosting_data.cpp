@@ -31,6 +31,10 @@ void check_options(const BoostOptions& options) {
     throw std::invalid_argument(
         fmt::format("llmt::fit_boosted: rate is {}, it must be from 0 (chosen) to 1", options.rate));
   }
+  if (options.seeds < 1 || options.seeds > most_seeds) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit_boosted: seeds is {}, it must be from 1 to {}", options.seeds, most_seeds));
+  }
   if (options.max_rounds < 1 || options.max_rounds > 100000) {
     throw std::invalid_argument(
         fmt::format("llmt::fit_boosted: max_rounds is {}, it must be from 1 to 100000", options.max_rounds));

@@ -162,6 +162,31 @@ Average stopped(const BoostingData& data, const Eigen::VectorXd& output, const S
   return result;
 }
 
+// The mean of sums whose seeds alone differ: they hold out the same rows.
+Average mean_of(const BoostingData& data, std::vector<Average> sums) {
+  if (sums.size() == 1) return std::move(sums.front());
+  const auto count = static_cast<double>(sums.size());
+  const Eigen::VectorXd& weights = data.rows.weights;
+  const std::vector<int>& chosen = data.hold_outs.front().held_out;
+  // Where a seed has no error of all parts, that of the rows that chose is the one of all seeds.
+  const bool is_of_all = std::ranges::all_of(
+      sums, [&](const Average& sum) { return sum.residuals.size() == weights.size(); });
+  for (Average& sum : sums) {
+    if (!is_of_all && sum.residuals.size() == weights.size()) sum.residuals = sum.residuals(chosen).eval();
+  }
+  Average mean = std::move(sums.front());
+  for (std::size_t k = 1; k < sums.size(); ++k) {
+    mean.residuals += sums[k].residuals;
+    mean.train_rmse += sums[k].train_rmse;
+    std::ranges::move(sums[k].parts, std::back_inserter(mean.parts));
+  }
+  mean.residuals /= count;
+  mean.train_rmse /= count;
+  for (SumPart& part : mean.parts) part.share /= count;
+  mean.rmse = rmse_of(mean.residuals, is_of_all ? weights : Eigen::VectorXd(weights(chosen)));
+  return mean;
+}
+
 BoostedSum fit_output(const BoostingData& data, Eigen::Index output, const BoostOptions& options, BoostSummary& summary,
                       Work& work) {
   const auto [y, mean, scale] = standardised(data.y.col(output), data.rows.weights);
@@ -178,14 +203,21 @@ BoostedSum fit_output(const BoostingData& data, Eigen::Index output, const Boost
     plan = race(data, y, plan.rounds, options.seed, racing);
   }
   if (options.rate > 0.0) plan.rounds.rate = options.rate;
-  Random random(options.seed);
-  Average result;
-  if (data.regime.takes_turns) {
-    summary.rows = summary.held_out = y.size();
-    result = average(data, y, plan.rounds, options.rate > 0.0, random, work);
-  } else {
-    result = stopped(data, y, plan, options, random, summary, work);
+  std::vector<Average> sums;
+  for (int k = 0; k < options.seeds; ++k) {
+    Work part(work, work.left() / (options.seeds - k));
+    BoostOptions own = options;
+    own.seed += static_cast<std::uint64_t>(k);
+    Random random(own.seed);
+    if (data.regime.takes_turns) {
+      summary.rows = summary.held_out = y.size();
+      sums.push_back(average(data, y, plan.rounds, options.rate > 0.0, random, part));
+    } else {
+      sums.push_back(stopped(data, y, plan, own, random, summary, part));
+    }
   }
+  Average result = mean_of(data, std::move(sums));
+  summary.held_out = result.residuals.size();
   summary.rmse = scale * result.rmse;
   if (result.residuals.size() == y.size()) summary.spread = scale * spread_of_parts(data, result.residuals);
   summary.train_rmse = scale * result.train_rmse;

@@ -128,6 +128,29 @@ TEST(FitBoosted, FitsTheOtherRowsAloneWhereRowsAreHeldOut) {
   EXPECT_NEAR(result.summaries[0].rmse, llmt::rmse(predicted, data.outputs.topRows(60))(0), 1e-5);
 }
 
+// The error of several seeds is that of the model on the held-out rows, and no larger than the mean of the seeds' own.
+TEST(FitBoosted, IsTheMeanOfSeveralSeeds) {
+  llmt::TrainingData data = friedman(900, 21);
+  llmt::Random random(22);
+  for (double& value : data.outputs.reshaped()) value += random.normal();
+  for (Eigen::Index i = 0; i < 900; i += 4) data.held_out.push_back(i);
+  const llmt::BoostOptions three{.seeds = 3, .max_threads = 2};
+  const llmt::BoostResult mean = llmt::fit_boosted(data, three);
+  const Eigen::VectorXd predicted = mean.model.predict(data.inputs).col(0);
+  double squares = 0.0;
+  for (Eigen::Index i = 0; i < 900; i += 4) squares += std::pow(predicted(i) - data.outputs(i, 0), 2);
+  EXPECT_NEAR(mean.summaries[0].rmse, std::sqrt(squares / 225.0), 1e-5);
+  EXPECT_LT(mean.summaries[0].rmse, llmt::fit_boosted(data).summaries[0].rmse);
+  EXPECT_EQ(llmt::to_json(llmt::fit_boosted(data, {.seeds = 3, .max_threads = 1}).model), llmt::to_json(mean.model));
+  // Few rows: all of them are held out in turn.
+  const llmt::TrainingData few = friedman(120, 23);
+  const llmt::BoostSummary one = llmt::fit_boosted(few).summaries[0];
+  const llmt::BoostSummary two = llmt::fit_boosted(few, {.seeds = 2}).summaries[0];
+  EXPECT_EQ(two.held_out, 120);
+  EXPECT_LT(two.rmse, 1.05 * one.rmse);
+  EXPECT_NE(two.rmse, one.rmse);
+}
+
 TEST(FitBoosted, DoesNotDependOnTheUnitOfAnOutput) {
   llmt::TrainingData data = friedman(300, 9);
   const llmt::BoostOptions options{.max_rounds = 20};
@@ -182,6 +205,7 @@ void expect_refusal(const llmt::TrainingData& data, const llmt::BoostOptions& op
 }
 
 TEST(FitBoosted, SaysWhatIsWrong) {
+  expect_refusal(friedman(50, 1), {.seeds = 0}, "seeds is 0, it must be from 1 to 100");
   expect_refusal(friedman(9, 1), {}, "different rows: 9; a sum of trees needs at least 10, one tree takes fewer");
   expect_refusal(friedman(50, 1), {.rate = 1.5}, "rate is 1.5");
   expect_refusal(friedman(50, 1), {.max_rounds = 0}, "max_rounds is 0");
