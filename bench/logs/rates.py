@@ -56,6 +56,14 @@ def named_right(r):
     return None if in_vain(r) and (r["cleared"] or r["undecided"]) else False
 
 
+def named_or_same(r):
+    """Also where other names say the same, as sign and Stribeck's friction for both in one term: within 2 %."""
+    right = named_right(r)
+    if right is not False or not answered(r) or not r["effects"] or r["unknown"] or r["inner"]:
+        return right
+    return r["function_error"] is not None and r["function_error"] <= 0.02
+
+
 def recognised(r, key):
     if not answered(r):
         return False
@@ -85,6 +93,7 @@ def demands():
     yield "  effect", ("effect",), named_right
     yield "  both", ("both",), named_right
     yield "  two", ("two",), named_right
+    yield "  or other names of the same function", NAMES, named_or_same
     yield "  alone", NAMES, lambda r: r["alone"] if answered(r) else False
     yield "  listed among others", NAMES, lambda r: r["listed"] if answered(r) else False
     yield "inner states: recognised", ("inner",), lambda r: recognised(r, "inner")

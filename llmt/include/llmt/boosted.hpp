@@ -100,8 +100,8 @@ struct BoostResult {
 /// the whole procedure, shares and number of trees chosen without the row. With more rows it is the mean of the sum and
 /// such a tree where the tree alone is better than the sum on the held-out rows.
 ///
-/// The mean of several seeds has the error of the mean: all hold out the same rows. Its other figures are means, and
-/// the variants those of the first seed.
+/// The mean of several seeds has the error of the mean: of each row that of trees fitted without it, so below 5000 rows
+/// every seed holds out other rows, and with more all hold out the same ones. The race is that of the first seed.
 ///
 /// BoostedModel::intervals() gives intervals, from the held-out rows' residuals and their spread.
 ///

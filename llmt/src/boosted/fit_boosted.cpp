@@ -162,33 +162,40 @@ Average stopped(const BoostingData& data, const Eigen::VectorXd& output, const S
   return result;
 }
 
-// The mean of sums whose seeds alone differ: they hold out the same rows.
-Average mean_of(const BoostingData& data, std::vector<Average> sums) {
+// Whether every row has a residual of trees fitted without it. Then each seed may hold out other rows.
+bool has_all_residuals(const BoostingData& data) {
+  return data.regime.takes_turns || (data.regime.uses_all_parts && !data.is_hold_out_given);
+}
+
+// The mean of sums of several seeds. `first`: the rows of the first one, and of all where they hold out the same ones.
+Average mean_of(const BoostingData& first, std::vector<Average> sums) {
   if (sums.size() == 1) return std::move(sums.front());
   const auto count = static_cast<double>(sums.size());
-  const Eigen::VectorXd& weights = data.rows.weights;
-  const std::vector<int>& chosen = data.hold_outs.front().held_out;
-  // Where a seed has no error of all parts, that of the rows that chose is the one of all seeds.
-  const bool is_of_all = std::ranges::all_of(
-      sums, [&](const Average& sum) { return sum.residuals.size() == weights.size(); });
-  for (Average& sum : sums) {
-    if (!is_of_all && sum.residuals.size() == weights.size()) sum.residuals = sum.residuals(chosen).eval();
-  }
+  const Eigen::VectorXd& weights = first.rows.weights;
+  const Eigen::Index rows = has_all_residuals(first) ? weights.size() : sums.front().residuals.size();
+  // Where one seed could not be held against all rows, the first one's residuals are those that there are.
+  const bool is_complete =
+      std::ranges::all_of(sums, [&](const Average& sum) { return sum.residuals.size() == rows; });
   Average mean = std::move(sums.front());
   for (std::size_t k = 1; k < sums.size(); ++k) {
-    mean.residuals += sums[k].residuals;
+    if (is_complete) mean.residuals += sums[k].residuals;
     mean.train_rmse += sums[k].train_rmse;
     std::ranges::move(sums[k].parts, std::back_inserter(mean.parts));
   }
-  mean.residuals /= count;
   mean.train_rmse /= count;
   for (SumPart& part : mean.parts) part.share /= count;
-  mean.rmse = rmse_of(mean.residuals, is_of_all ? weights : Eigen::VectorXd(weights(chosen)));
+  if (!is_complete) return mean;
+  mean.residuals /= count;
+  const bool is_of_all = mean.residuals.size() == weights.size();
+  mean.rmse =
+      rmse_of(mean.residuals, is_of_all ? weights : Eigen::VectorXd(weights(first.hold_outs.front().held_out)));
   return mean;
 }
 
-BoostedSum fit_output(const BoostingData& data, Eigen::Index output, const BoostOptions& options, BoostSummary& summary,
-                      Work& work) {
+// `deals`: the rows of the first seed, and of the others where they hold out other rows.
+BoostedSum fit_output(const std::vector<BoostingData>& deals, Eigen::Index output, const BoostOptions& options,
+                      BoostSummary& summary, Work& work) {
+  const BoostingData& data = deals.front();
   const auto [y, mean, scale] = standardised(data.y.col(output), data.rows.weights);
   if (data.hold_outs.empty()) {
     summary.rows = y.size();
@@ -209,11 +216,12 @@ BoostedSum fit_output(const BoostingData& data, Eigen::Index output, const Boost
     BoostOptions own = options;
     own.seed += static_cast<std::uint64_t>(k);
     Random random(own.seed);
+    const BoostingData& dealt = deals[std::min<std::size_t>(k, deals.size() - 1)];
     if (data.regime.takes_turns) {
       summary.rows = summary.held_out = y.size();
-      sums.push_back(average(data, y, plan.rounds, options.rate > 0.0, random, part));
+      sums.push_back(average(dealt, y, plan.rounds, options.rate > 0.0, random, part));
     } else {
-      sums.push_back(stopped(data, y, plan, own, random, summary, part));
+      sums.push_back(stopped(dealt, y, plan, own, random, summary, part));
     }
   }
   Average result = mean_of(data, std::move(sums));
@@ -292,12 +300,19 @@ BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
 
 BoostResult fit_boosted(const TrainingData& data, const BoostOptions& options, const Progress& progress) {
   Work work(progress);
-  const BoostingData rows = boosting_data(data, options);
+  std::vector<BoostingData> deals;
+  deals.push_back(boosting_data(data, options));
+  for (int k = 1; k < options.seeds && has_all_residuals(deals.front()); ++k) {
+    BoostOptions own = options;
+    own.seed += static_cast<std::uint64_t>(k);
+    deals.push_back(boosting_data(data, own));
+  }
+  const BoostingData& rows = deals.front();
   std::vector<BoostedSum> sums;
   std::vector<BoostSummary> summaries;
   for (Eigen::Index output = 0; output < rows.y.cols(); ++output) {
     Work part(work, work.left() / static_cast<double>(rows.y.cols() - output));
-    sums.push_back(fit_output(rows, output, options, summaries.emplace_back(), part));
+    sums.push_back(fit_output(deals, output, options, summaries.emplace_back(), part));
   }
   BoostResult result{model_of(rows, std::move(sums)), std::move(summaries)};
   work.finish();

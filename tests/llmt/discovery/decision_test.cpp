@@ -62,6 +62,25 @@ void add_fact(const std::string& what, Missing& missing) {
   if (what.starts_with("parameters")) missing.parameters_explain = true;
 }
 
+// Effects in parts approximate any function, as the leaves of a tree do; one of them is a name.
+TEST(Decision, SeveralEffectsInPartsMayStandForAnother) {
+  Missing missing;
+  missing.found = {term(), term()};
+  missing.found[0].inputs = {"x", "v"};
+  missing.found[1].inputs = {"y", "v"};
+  for (FoundTerm& found : missing.found) found.shrinks_gap = true;
+  missing.found[0].regime = "v";
+  Missing two = missing;
+  two.found[1].regime = "v";
+  judge_findings(missing, true);
+  decide(missing);
+  EXPECT_EQ(missing.answer, Answer::named);
+  judge_findings(two, true);
+  decide(two);
+  EXPECT_EQ(two.answer, Answer::unknown);
+  EXPECT_FALSE(two.found[0].confirmed || two.found[1].confirmed);
+}
+
 TEST(Decision, IsThatOfTheTableInTheDocs) {
   const std::vector<std::vector<std::string>> rows = rows_of_the_page();
   ASSERT_EQ(rows.size(), 11u);

@@ -50,7 +50,8 @@ std::vector<Place> places_of(const FoundTerm& found, bool in_time) {
 }
 
 // Of each term found, whether it and others may only approximate one that was not tried: three or more kinds of one
-// input (in time, two of which one has a rival of that input), or two terms of the same two inputs. A term for which
+// input (in time, two of which one has a rival of that input), two terms of the same two inputs, or two that each act
+// in a part alone: functions in parts approximate any other one, as the leaves of a tree do. A term for which
 // an offset could stand counts, in time, as one of each input of which a function could stand for it too.
 std::vector<bool> approximations(const std::vector<FoundTerm>& all, bool in_time) {
   // Terms of one input are counted by kinds, as there may be several steps. A product and a square times the other
@@ -58,7 +59,9 @@ std::vector<bool> approximations(const std::vector<FoundTerm>& all, bool in_time
   constexpr std::array<std::size_t, 2> too_many = {3, 2};
   std::map<Place, std::set<std::string>> kinds;
   std::set<Place> uncertain;
+  std::map<Eigen::Index, int> in_regimes;
   for (const FoundTerm& found : all) {
+    if (!found.regime.empty()) ++in_regimes[found.output_index];
     for (const Place& place : places_of(found, in_time)) {
       const std::vector<std::string>& inputs = place.first;
       if (in_time && inputs.size() == 1 && has_rival_of(found, inputs.front())) uncertain.insert(place);
@@ -67,9 +70,11 @@ std::vector<bool> approximations(const std::vector<FoundTerm>& all, bool in_time
   }
   std::vector<bool> approximate;
   for (const FoundTerm& found : all) {
-    approximate.push_back(std::ranges::any_of(places_of(found, in_time), [&](const Place& place) {
-      return kinds[place].size() + (uncertain.contains(place) ? 1 : 0) >= too_many[place.first.size() - 1];
-    }));
+    const bool is_among_parts = !found.regime.empty() && in_regimes[found.output_index] > 1;
+    approximate.push_back(is_among_parts || std::ranges::any_of(places_of(found, in_time), [&](const Place& place) {
+                            return kinds[place].size() + (uncertain.contains(place) ? 1 : 0) >=
+                                   too_many[place.first.size() - 1];
+                          }));
   }
   return approximate;
 }
@@ -196,7 +201,7 @@ std::string to_string(Reason reason) {
     case Reason::structure:
       return "what is left still depends on the inputs";
     case Reason::approximation:
-      return "it is one of several terms of the same inputs, which may stand for one that was not tried";
+      return "it is one of several terms of the same inputs, or in parts, which may stand for one that was not tried";
     case Reason::no_gain:
       return "it does not make the error on the rows set aside smaller";
     case Reason::vague_state:
