@@ -18,9 +18,8 @@ void boost_command(const CLI::App& command, const BoostArguments& arguments) {
         fmt::format("{}: {} row{}; --boost needs at least {} that differ, llmt fit without --boost takes fewer",
                     table_name(arguments.learning.data), rows, rows == 1 ? "" : "s", fewest_boosted_rows));
   }
-  const BoostOptions options{.seed = table.options.folds.seed,
-                             .seeds = arguments.seeds,
-                             .max_threads = table.options.max_threads};
+  const BoostOptions options{
+      .seed = table.options.folds.seed, .seeds = arguments.seeds, .max_threads = table.options.max_threads};
   ProgressBar bar("boosting");
   const BoostResult result = fit_boosted(*table.data, options, bar.callback());
   bar.clear();

@@ -10,6 +10,7 @@ import numpy as np
 from . import _core
 from ._progress import Bar
 from ._regressor import share
+from ._series import record_begins, signals, step_of
 
 
 _PARAMETERS = ("lags", "delay", "purpose", "rest", "n_jobs")
@@ -93,11 +94,11 @@ class DynamicLocalLinearTreeRegressor:
         ValueError
             If shapes differ, times are not at equal steps, or nothing can be learned; the message says which row.
         """
-        outputs, output_names = _signals(y, "y")
-        inputs, input_names = _signals(u, "u", len(outputs))
-        begins = _record_begins(records, len(outputs))
+        outputs, output_names = signals(y, "y")
+        inputs, input_names = signals(u, "u", len(outputs))
+        begins = record_begins(records, len(outputs))
         if dt is None:
-            dt = _step_of(y, begins)
+            dt = step_of(y, begins)
         with Bar() as bar:
             fitted = _core.fit_system(
                 inputs,
@@ -126,8 +127,8 @@ class DynamicLocalLinearTreeRegressor:
 
         One row of `y0` is a system at rest there. Behind a row where the run left all bounds there is NaN.
         """
-        initial, _ = _signals(y0, "y")
-        inputs, _ = _signals(u, "u", len(initial))
+        initial, _ = signals(y0, "y")
+        inputs, _ = signals(u, "u", len(initial))
         outputs, _, _ = self._model().simulate(inputs, initial)
         return np.asarray(outputs)
 
@@ -149,8 +150,8 @@ class DynamicLocalLinearTreeRegressor:
         level = share("coverage", coverage)
         if not self._model().has_band():
             raise ValueError("simulate_interval: the model has no errors of held-out runs; fit again")
-        initial, _ = _signals(y0, "y")
-        inputs, _ = _signals(u, "u", len(initial))
+        initial, _ = signals(y0, "y")
+        inputs, _ = signals(u, "u", len(initial))
         lower, upper = self._model().band(inputs, initial, level)
         return np.stack([np.asarray(lower), np.asarray(upper)], axis=1)
 
@@ -212,8 +213,8 @@ class DynamicLocalLinearTreeRegressor:
 
     def predict(self, u: Any, y: Any) -> np.ndarray:
         """Predictions of each row from the measured rows before it: (rows, outputs), NaN for the first ones."""
-        outputs, _ = _signals(y, "y")
-        inputs, _ = _signals(u, "u", len(outputs))
+        outputs, _ = signals(y, "y")
+        inputs, _ = signals(u, "u", len(outputs))
         return np.asarray(self._model().predict(inputs, outputs))
 
     def poles(self) -> dict[str, np.ndarray]:
@@ -315,59 +316,3 @@ class DynamicLocalLinearTreeRegressor:
         if isinstance(self.purpose, int) and not isinstance(self.purpose, bool) and self.purpose > 0:
             return self.purpose
         raise ValueError(f"purpose is {self.purpose!r}, it must be 'simulation', 'prediction' or a number of rows")
-
-
-def _signals(values: Any, name: str, rows: int = 0) -> tuple[np.ndarray, list[str]]:
-    """Signals as columns, and their names: those of a frame, or `name`, or name1, name2, ..."""
-    if values is None:
-        return np.empty((rows, 0)), []
-    columns = getattr(values, "columns", None)
-    of_series = getattr(values, "name", None)
-    array = np.asarray(values, dtype=float)
-    if array.ndim == 1:
-        array = array.reshape(-1, 1)
-    if array.ndim != 2:
-        raise ValueError(f"{name} has {array.ndim} dimensions; it has rows, or rows and columns")
-    if columns is not None:
-        names = [str(column) for column in columns]
-    elif of_series is not None and array.shape[1] == 1:
-        names = [str(of_series)]
-    else:
-        names = [name] if array.shape[1] == 1 else [f"{name}{k + 1}" for k in range(array.shape[1])]
-    return array, names
-
-
-def _record_begins(records: Any, rows: int) -> list[int]:
-    if records is None:
-        return []
-    labels = list(records)
-    if len(labels) != rows:
-        raise ValueError(f"records has {len(labels)} labels, y has {rows} rows")
-    begins = [row for row in range(rows) if row == 0 or labels[row] != labels[row - 1]]
-    seen: set[Any] = set()
-    for row in begins:
-        if labels[row] in seen:
-            raise ValueError(f"records: {labels[row]!r} goes on in row {row}, behind another record; sort the rows")
-        seen.add(labels[row])
-    return begins
-
-
-def _step_of(values: Any, begins: list[int]) -> float:
-    """The step of a frame's index in seconds; 1 where there is none."""
-    index = getattr(values, "index", None)
-    if index is None or callable(index) or len(index) < 2:
-        return 1.0
-    times = np.asarray(index)
-    if times.dtype.kind == "M":
-        times = times.astype("datetime64[ns]").astype(np.int64) / 1e9
-    elif times.dtype.kind not in "iuf":
-        return 1.0
-    steps = np.diff(times.astype(float))
-    inside = np.ones(len(steps), dtype=bool)
-    inside[[begin - 1 for begin in begins if begin > 0]] = False
-    step = float(np.median(steps[inside]))
-    wrong = np.flatnonzero(inside & ~(np.abs(steps - step) <= 0.01 * abs(step)))
-    if not step > 0 or len(wrong):
-        row = int(wrong[0]) + 1 if len(wrong) else 1
-        raise ValueError(f"y: the index does not rise in equal steps at row {row}; give dt, or put the rows on a grid")
-    return step

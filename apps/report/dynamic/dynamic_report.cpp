@@ -63,12 +63,14 @@ std::string dynamic_text(const DynamicRun& run, std::size_t width) {
     const int rows = summary.delays[i];
     const std::string& input = model.parts().inputs[i].name;
     if (rows == no_delay_helps) {
-      text += fmt::format("Dead time of {0}: none that was tried helps a linear model. If {0} acts later, give it: "
-                          "--delay {0}:ROWS\n", input);
+      text += fmt::format(
+          "Dead time of {0}: none that was tried helps a linear model. If {0} acts later, give it: "
+          "--delay {0}:ROWS\n",
+          input);
       continue;
     }
-    text += fmt::format("Dead time of {}: {} row{}, {}; its lags count from there\n", input, rows,
-                        rows == 1 ? "" : "s", run_time_text(rows * model.parts().sample_time, model.parts().time_unit));
+    text += fmt::format("Dead time of {}: {} row{}, {}; its lags count from there\n", input, rows, rows == 1 ? "" : "s",
+                        run_time_text(rows * model.parts().sample_time, model.parts().time_unit));
   }
   for (const Signal& input : model.parts().inputs) {
     if (input.low == input.high) text += fmt::format("{} never changes, so nothing is learned from it\n", input.name);

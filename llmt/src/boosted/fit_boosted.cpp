@@ -174,8 +174,7 @@ Average mean_of(const BoostingData& first, std::vector<Average> sums) {
   const Eigen::VectorXd& weights = first.rows.weights;
   const Eigen::Index rows = has_all_residuals(first) ? weights.size() : sums.front().residuals.size();
   // Where one seed could not be held against all rows, the first one's residuals are those that there are.
-  const bool is_complete =
-      std::ranges::all_of(sums, [&](const Average& sum) { return sum.residuals.size() == rows; });
+  const bool is_complete = std::ranges::all_of(sums, [&](const Average& sum) { return sum.residuals.size() == rows; });
   Average mean = std::move(sums.front());
   for (std::size_t k = 1; k < sums.size(); ++k) {
     if (is_complete) mean.residuals += sums[k].residuals;
@@ -187,8 +186,7 @@ Average mean_of(const BoostingData& first, std::vector<Average> sums) {
   if (!is_complete) return mean;
   mean.residuals /= count;
   const bool is_of_all = mean.residuals.size() == weights.size();
-  mean.rmse =
-      rmse_of(mean.residuals, is_of_all ? weights : Eigen::VectorXd(weights(first.hold_outs.front().held_out)));
+  mean.rmse = rmse_of(mean.residuals, is_of_all ? weights : Eigen::VectorXd(weights(first.hold_outs.front().held_out)));
   return mean;
 }
 

@@ -41,14 +41,20 @@ TEST(Lags, SayWhichOutputsAddUp) {
 }
 
 TEST(Lags, ThatCannotBeReadAreNamed) {
-  const std::vector<std::pair<std::string, std::string>> cases = {
-      {"", "NAME:LAG"},           {"y", "\"y\""},
-      {"y:", "\"y:\""},           {"y:0-2", "begin at 1"},
-      {"z:1", "no input or output \"z\"; there are y, u"},   {"y:3-1", "ends before"},
-      {"u:1-99999", "at most"},   {"y:1,,u:1", "\"\""},
-      {"y:1.5", "\"y:1.5\""},     {"y:-1", "\"y:-1\""},
-      {"u:+1", "only an output"}, {"y:+2-3,u:1", "begin at 1"},
-      {"y:+1", "there are none"}, {"u:0-5000", "there are 5001"}};
+  const std::vector<std::pair<std::string, std::string>> cases = {{"", "NAME:LAG"},
+                                                                  {"y", "\"y\""},
+                                                                  {"y:", "\"y:\""},
+                                                                  {"y:0-2", "begin at 1"},
+                                                                  {"z:1", "no input or output \"z\"; there are y, u"},
+                                                                  {"y:3-1", "ends before"},
+                                                                  {"u:1-99999", "at most"},
+                                                                  {"y:1,,u:1", "\"\""},
+                                                                  {"y:1.5", "\"y:1.5\""},
+                                                                  {"y:-1", "\"y:-1\""},
+                                                                  {"u:+1", "only an output"},
+                                                                  {"y:+2-3,u:1", "begin at 1"},
+                                                                  {"y:+1", "there are none"},
+                                                                  {"u:0-5000", "there are 5001"}};
   for (const auto& [text, message] : cases) {
     try {
       llmt::parse_lags(text, {"u"}, {"y"});
