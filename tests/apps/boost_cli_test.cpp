@@ -70,6 +70,18 @@ TEST(BoostProgram, TakesASeed) {
   EXPECT_NE(model("2.json"), model("m.json"));
 }
 
+TEST(BoostProgram, TakesTheMeanOfSeveralSeeds) {
+  const Folder folder;
+  ASSERT_NO_FATAL_FAILURE(fit_sum(folder, 60));
+  const Outcome fitted = folder.run(LLMT_PROGRAM " fit d.csv -t y --boost --seeds 2 -o two.json");
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+  EXPECT_NE(fitted.out.find("the mean of those of 2 seeds"), std::string::npos) << fitted.out;
+  const auto trees = [&](const char* name) { return llmt::size_of(llmt::load_boosted(folder.file(name))).trees; };
+  EXPECT_GT(trees("two.json"), trees("m.json"));
+  EXPECT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --boost --seeds 0").exit_code, 2);
+  EXPECT_EQ(folder.run(LLMT_PROGRAM " fit d.csv -t y --seeds 2").exit_code, 2);
+}
+
 TEST(BoostProgram, RefusesByNameWhatIsForOneTree) {
   const Folder folder;
   ASSERT_NO_FATAL_FAILURE(fit_sum(folder, 60));

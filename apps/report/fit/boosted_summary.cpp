@@ -58,6 +58,7 @@ Json boosted_json(const BoostedRun& run, const BoostResult& result) {
                             {"compared", std::move(compared)},
                             {"trees", summary.trees},
                             {"rate", result.model.sums()[o].rate}});
+    if (summary.seeds > 1) json["sums"].back()["seeds"] = summary.seeds;
   }
   json["model"] = run.output.empty() ? Json(nullptr) : Json(run.output);
   return json;
@@ -85,6 +86,10 @@ std::string boosted_text(const BoostedRun& run, const BoostResult& result, std::
     }
   }
   text += wrapped(rare_levels_text(result.model), width);
+  if (const int seeds = result.summaries.front().seeds; seeds > 1) {
+    text += wrapped(
+        fmt::format("Each sum is the mean of those of {} seeds; what was compared is of the first.\n", seeds), width);
+  }
   const bool is_of_all = std::ranges::all_of(
       result.summaries, [](const BoostSummary& summary) { return summary.held_out == summary.rows; });
   return text + wrapped(is_of_all

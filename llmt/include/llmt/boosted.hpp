@@ -71,6 +71,7 @@ struct BoostSummary {
   double spread = 0.0;                 ///< standard deviation of the RMSE of the five parts of these rows; 0: one part
   std::string variant;                 ///< the one taken; "blend": a mean; "mean": see BoostOptions::mean_of_few
   std::vector<BoostVariant> compared;  ///< empty: symmetric trees, without a choice
+  int seeds = 1;                       ///< BoostOptions::seeds
   Eigen::Index trees = 0;
   double train_rmse = 0.0;
 };

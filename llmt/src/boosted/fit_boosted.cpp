@@ -224,6 +224,7 @@ BoostedSum fit_output(const std::vector<BoostingData>& deals, Eigen::Index outpu
   }
   Average result = mean_of(data, std::move(sums));
   summary.held_out = result.residuals.size();
+  summary.seeds = options.seeds;
   summary.rmse = scale * result.rmse;
   if (result.residuals.size() == y.size()) summary.spread = scale * spread_of_parts(data, result.residuals);
   summary.train_rmse = scale * result.train_rmse;

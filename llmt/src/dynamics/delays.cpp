@@ -43,7 +43,7 @@ std::vector<double> errors_of_delays(const Task& task, const std::vector<Stretch
                                      const std::function<Lags(int)>& lags_with, Work& work) {
   std::vector<double> errors;
   for (int delay = 0; delay <= most; ++delay) {
-    Work part(work, 1.0 / (most + 1.0 - delay));
+    Work part(work, 1.0 / (most + 2.0));
     errors.push_back(error_of(task, folds, on_runs, lags_with(delay), most - delay, part));
   }
   return errors;

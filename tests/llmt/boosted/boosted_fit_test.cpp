@@ -147,6 +147,7 @@ TEST(FitBoosted, IsTheMeanOfSeveralSeeds) {
   const llmt::BoostSummary one = llmt::fit_boosted(few).summaries[0];
   const llmt::BoostSummary two = llmt::fit_boosted(few, {.seeds = 2}).summaries[0];
   EXPECT_EQ(two.held_out, 120);
+  EXPECT_EQ(two.seeds, 2);
   EXPECT_LT(two.rmse, 1.05 * one.rmse);
   EXPECT_NE(two.rmse, one.rmse);
 }

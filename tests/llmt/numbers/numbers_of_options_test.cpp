@@ -123,7 +123,7 @@ TEST(NumbersOfOptions, OfASumOfTrees) {
     expect_finite_or_refused("boost " + what,
                              [&] { return is_finite(llmt::fit_boosted(data, options).model, data.inputs); });
   });
-  EXPECT_EQ(members, 4);
+  EXPECT_EQ(members, 5);
 }
 
 TEST(NumbersOfOptions, OfAStream) {
