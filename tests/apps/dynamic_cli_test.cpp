@@ -146,6 +146,27 @@ TEST(DynamicProgram, SaysWhatTheLocalModelsDoAndWhereTheyRest) {
   EXPECT_NE(text.out.find("settles in s"), std::string::npos) << text.out;
 }
 
+// v does nothing: no number of rows is its dead time.
+TEST(DynamicProgram, SaysWhichInputHasNoDeadTime) {
+  const Folder folder;
+  llmt::Random random(31);
+  std::string table = "u,v,y\n";
+  double before = 0.0;
+  double y = 0.0;
+  for (int row = 0; row < 300; ++row) {
+    const double u = random.normal();
+    y = 0.7 * y + 0.5 * before;
+    before = u;
+    table += fmt::format("{},{},{}\n", u, random.normal(), y + 0.01 * random.normal());
+  }
+  folder.write("d.csv", table);
+  const std::string fit = LLMT_PROGRAM " fit d.csv -t y --lags y:1,u:0,v:0 --delay auto";
+  const Outcome found = folder.run(fit + " --json");
+  ASSERT_EQ(found.exit_code, 0) << found.err;
+  EXPECT_EQ(nlohmann::json::parse(found.out)["delays"], nlohmann::json({1, nullptr}));
+  EXPECT_NE(folder.run(fit).out.find("If v acts later, give it: --delay v:ROWS"), std::string::npos);
+}
+
 // The sample's pipe holds what flows in back for 30 s, three rows.
 TEST(DynamicProgram, FindsTheDeadTimeOfThePipe) {
   const Folder folder;

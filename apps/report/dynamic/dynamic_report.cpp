@@ -119,6 +119,9 @@ Json dynamic_json(const DynamicRun& run) {
                {"held_out", errors_json(summary.held_out)},
                {"linear", errors_json(summary.linear)},
                {"training", errors_json(summary.training)}};
+  for (Json& delay : json["delays"]) {
+    if (delay == no_delay_helps) delay = nullptr;
+  }
   json["compared"] = Json::array();
   for (const DynamicCandidate& candidate : summary.compared) {
     json["compared"].push_back({{"description", candidate.description},

@@ -75,7 +75,7 @@ struct DynamicSummary {
   std::vector<DynamicCandidate> compared;  ///< by error, the smallest first
   std::size_t chosen = 0;                  ///< of these
   std::string continuation;                ///< outside of the training ranges: "guarded", "linear" or "polynomial"
-  std::vector<int> delays;                 ///< dead time of each input in rows where one was asked for; else empty
+  std::vector<int> delays;                 ///< of each input in rows, or no_delay_helps; empty: none was asked for
   RunErrors held_out;                      ///< of the chosen candidate
   RunErrors linear;                        ///< of the best linear one, on the same stretches
   RunErrors training;                      ///< of the model over its own records
