@@ -37,8 +37,8 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
     max_iter : int, default=2000
         Most trees of a target, before the sum is fitted to all rows with a quarter more.
     seeds : int, default=1
-        The model is the mean of this many sums, whose splits look at other inputs each. About 2 % more accurate below
-        5000 rows, less with more, and as many times as slow to fit and to predict.
+        The model is the mean of this many sums, whose splits look at other inputs each. Two are about 2 % more accurate
+        in the mean of many tables; to fit and to predict takes as many times as long.
     categorical_features : sequence of str or int, default=()
         Columns that are categories although they hold numbers. Columns of words are categories anyway.
     random_state : int, RandomState or None, default=None
