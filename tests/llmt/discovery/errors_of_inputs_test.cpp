@@ -74,6 +74,36 @@ TEST(ErrorsOfInputs, DoNotShrinkACoefficientWhereTheyAreTold) {
   EXPECT_LT(chi_squared, quantile);
 }
 
+// y = x + 2 tanh(x/0.2), and the least width that may stand for 0.2 is 0.25: what would make it smaller must not go into
+// the coefficient.
+TEST(ErrorsOfInputs, LeaveACoefficientAsItIsBesideAConstantAtItsEnd) {
+  constexpr double least = 0.25;
+  Noise noise(1);
+  Table table;
+  table.inputs.noise = Eigen::VectorXd::Constant(1, 1e-4);
+  Eigen::VectorXd shape(table.inputs.values.rows());
+  for (Eigen::Index i = 0; i < shape.size(); ++i) {
+    const double x = noise.normal();
+    table.inputs.values(i, 0) = table.simulated(i, 0) = x;
+    table.measured.values(i, 0) = x + 2.0 * std::tanh(x / 0.2) + 0.05 * noise.normal();
+    shape(i) = std::tanh(x / least);
+  }
+  ModelTerm term{.family = "tanh",
+                 .location = "x",
+                 .formula = "tanh(x/c)",
+                 .inputs = {"x"},
+                 .coefficients = {"limit"},
+                 .columns = [](const Rows& rows, const Eigen::VectorXd& constants) -> Eigen::MatrixXd {
+                   return (rows.inputs.col(0).array() / constants(0)).tanh();
+                 },
+                 .constants = {{.name = "c", .unit = "x", .tried = {0.5, 0.75, 1.0}, .smooth = true}}};
+  const Missing missing = find_missing(tabulated(table.simulated, {"y"}), table.inputs, table.measured, {term});
+  ASSERT_EQ(missing.found.size(), 1u);
+  EXPECT_EQ(missing.found[0].constants(0), least);
+  const Eigen::VectorXd gap = table.measured.values.col(0) - table.simulated.col(0);
+  EXPECT_NEAR(missing.found[0].coefficients(0), shape.dot(gap) / shape.squaredNorm(), 0.01);
+}
+
 // Errors of the input count at the few rows where the term is steep.
 TEST(ErrorsOfInputs, StandardErrorsAreTheSpreadOfEstimatesOfASteepTerm) {
   constexpr int tables = 60;

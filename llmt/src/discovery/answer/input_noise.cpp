@@ -27,9 +27,17 @@ Eigen::VectorXd stacked(const TermData& data, const Eigen::MatrixXd& of_rows) {
   return all;
 }
 
+// At an end of its range a constant is held there: what would move it on is left to no other number.
 bool is_fitted(const TermModel& model, const PlacedTerm& placed) {
-  const std::vector<TermConstant>& constants = model.terms()[placed.term].constants;
-  return !constants.empty() && constants.front().smooth;
+  const ModelTerm& term = model.terms()[placed.term];
+  if (term.constants.empty() || !term.constants.front().smooth) return false;
+  constexpr double nudge = 1e-9;
+  for (const double factor : {1.0 - nudge, 1.0 + nudge}) {
+    Eigen::VectorXd moved = placed.constants;
+    moved(0) *= factor;
+    if (within_range(term, moved)(0) != moved(0)) return false;
+  }
+  return true;
 }
 
 // Places of what is fitted of a term among its coefficients and constants.
@@ -193,6 +201,7 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
     if (model_->parameters()[k].free) free.push_back(k);
   }
   TermFit moved = fit;
+  std::vector<std::vector<Eigen::Index>> places(fit.placed.size());  // of the last step
   Eigen::VectorXd factors;
   for (int step = 0; step < steps; ++step) {
     const Eigen::MatrixXd own = jacobian(*model_, data, moved);
@@ -230,8 +239,10 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
                   .sqrt();
     for (std::size_t k = 0; k < free.size(); ++k) moved.parameters(free[k]) += change(static_cast<Eigen::Index>(k));
     Eigen::Index next = std::ssize(free);
-    for (PlacedTerm& placed : moved.placed) {
-      for (const Eigen::Index k : fitted_places(*model_, placed)) {
+    for (std::size_t t = 0; t < places.size(); ++t) {
+      PlacedTerm& placed = moved.placed[t];
+      places[t] = fitted_places(*model_, placed);
+      for (const Eigen::Index k : places[t]) {
         (k < placed.coefficients.size() ? placed.coefficients(k) : placed.constants(0)) += change(next++);
       }
       placed.constants = within_range(model_->terms()[placed.term], placed.constants);
@@ -242,7 +253,7 @@ std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit)
     moved.parameter_errors(free[k]) *= factors(static_cast<Eigen::Index>(k));
   Eigen::Index next = std::ssize(free);
   for (std::size_t t = 0; t < moved.placed.size(); ++t) {
-    for (const Eigen::Index k : fitted_places(*model_, moved.placed[t])) moved.errors[t](k) *= factors(next++);
+    for (const Eigen::Index k : places[t]) moved.errors[t](k) *= factors(next++);
   }
   fit = std::move(moved);
   return beyond;

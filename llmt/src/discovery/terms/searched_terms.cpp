@@ -131,7 +131,7 @@ std::vector<ModelTerm> odd_functions(const InputView& input) {
   // Stribeck's peak has gone before the farther end. A wider one is a sign and a square.
   TermConstant peak = smooth_constant(input, "c", widths(input, 0.01, 0.3));
   peak.width = true;
-  const TermConstant wide = smooth_constant(input, "c", widths(input, 0.15));
+  const TermConstant wide = smooth_constant(input, "c", widths(input, 0.05));
   return {one_function(
               input, "tanh", fmt::format("tanh({}/c)", x), "limit", width,
               [](const Eigen::ArrayXd& v, double c) -> Eigen::ArrayXd { return (v / c).tanh(); }, "tanh($1/$c)"),
