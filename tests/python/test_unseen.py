@@ -52,6 +52,16 @@ def test_a_word_is_a_word(estimator, word):
     assert fitted.predict(asked(None))[0] == pytest.approx(2.65, abs=0.4)
 
 
+@pytest.mark.parametrize("numbers", [[0, 1], [0.5, None], [True, False]])
+def test_numbers_are_no_words(numbers):
+    fitted = ESTIMATORS[1].fit(*countries("SE"))
+    message = r'column "country" holds numbers \((0|1|0.5) in row 0\); in training it held words'
+    with pytest.raises(TypeError, match=message):
+        fitted.predict(pd.DataFrame({"country": numbers, "x": 0.5}))
+    # Nothing but missing cells is no type.
+    assert np.isfinite(fitted.predict(pd.DataFrame({"country": [None, None], "x": 0.5}))).all()
+
+
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_intervals_of_what_was_not_there_are_called_too_narrow(estimator):
     X, y = countries("SE")

@@ -127,7 +127,7 @@ def by_given_levels(raw: Raw, column: int, levels: list[str]) -> dict[str, int]:
 
 
 def _numbers_by_level(raw: Raw, column: int, levels: list[str]) -> dict[str, int]:
-    """Numbers by the value of the labels that are texts of numbers."""
+    """Numbers by the value of the labels that are texts of numbers; raises TypeError if there are no such labels."""
     position: dict[float, float] = {}
     for k, level in enumerate(levels):
         if _NUMBER.fullmatch(level):
@@ -136,6 +136,11 @@ def _numbers_by_level(raw: Raw, column: int, levels: list[str]) -> dict[str, int
                 position[value] = float(k)
     cells = raw.writable(column)
     here = ~np.isnan(cells)
+    if not position and here.any():
+        row = int(np.argmax(here))
+        raise TypeError(
+            f"{place_of(raw, column, 'the column')} holds numbers ({text_of(cells[row])} in row {row}); in training it held words"
+        )
     numbers, index = np.unique(cells[here], return_inverse=True)
     if any(level.lstrip("+-").isdigit() and abs(float(level)) >= _EXACT for level in levels):
         _refuse_merged(raw, column, cells)
