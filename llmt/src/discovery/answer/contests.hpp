@@ -48,8 +48,12 @@ struct Advantage {
 ///     sum_o phi N / 2 ln(S_o / S'_o),    S sums of squares,
 ///
 /// phi the independent share of the samples. Above 0 where `other` is better. Samples beyond 5 of `floors` (d) in both
-/// are outliers and do not count. Its variance is that of a sum over blocks of 2 / phi neighbours of e^2 - e'^2, in the
-/// same unit (Vuong 1989): large where few samples decide, as those at which a machine reverses.
+/// are outliers and do not count. Its variance is that of a sum over blocks of 2 / phi neighbours of
+///
+///     phi / 2 (N e^2 / S_o - N e'^2 / S'_o),
+///
+/// by which the likelihoods of single samples scatter (Vuong 1989): large where few samples decide, as those at which a
+/// machine reverses.
 Advantage advantage(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
                     double independent_share);
 

@@ -73,20 +73,22 @@ Advantage advantage(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, 
     const Eigen::ArrayXd others = other.col(o).cwiseAbs();
     const Eigen::ArrayXd counts = (own.min(others) <= far_off * floors(o)).cast<double>();
     const double smallest = std::numeric_limits<double>::min();
+    const double n = counts.sum();
     const double left = (counts * own.square()).sum() + smallest;
     const double left_by_other = (counts * others.square()).sum() + smallest;
-    const double ratio = 0.5 * independent_share * counts.sum() * std::log(left / left_by_other);
-    sum.log_likelihood += ratio;
-    const Eigen::ArrayXd differences = counts * (own.square() - others.square());
-    if (!(differences.abs().maxCoeff() > 0.0)) continue;
+    const double of_a_sample = 0.5 * independent_share * std::log(left / left_by_other);
+    sum.log_likelihood += n * of_a_sample;
+    if (!((own - others).abs().maxCoeff() > 0.0)) continue;
+    // Of each sample, less the mean.
+    const Eigen::ArrayXd scatter =
+        0.5 * independent_share * n * counts * (own.square() / left - others.square() / left_by_other);
     const auto length = static_cast<Eigen::Index>(std::ceil(2.0 / independent_share));
     double squares = 0.0;
-    for (Eigen::Index i = 0; i < differences.size(); i += length) {
-      const double block = differences.segment(i, std::min(length, differences.size() - i)).sum();
-      squares += block * block;
+    double blocks = 0.0;
+    for (Eigen::Index i = 0; i < scatter.size(); i += length, ++blocks) {
+      squares += std::pow(scatter.segment(i, std::min(length, scatter.size() - i)).sum(), 2.0);
     }
-    const double nats = ratio != 0.0 ? std::abs(ratio / (left - left_by_other)) : 0.0;
-    variance += nats * nats * squares;
+    variance += blocks > 1.0 ? squares * blocks / (blocks - 1.0) : std::numeric_limits<double>::infinity();
   }
   sum.standard_error = std::sqrt(variance);
   return sum;
