@@ -105,11 +105,16 @@ TEST(CrossValidation, LikelihoodsAreThoseOfNormalNoise) {
   EXPECT_NEAR(nats(large, other, 1.0), 50.0 * std::log((99.0 * 4.0 + 36.0) / 100.0), 1e-9);
 }
 
-// The spread of the ratio over draws of normal noise, and of noise that few samples carry.
+// The spread of the ratio over draws of normal noise, of noise that few samples carry, and where one of the two leaves
+// little of what the other leaves.
 TEST(CrossValidation, StandardErrorIsTheSpreadOverDraws) {
   constexpr Eigen::Index n = 400;
   constexpr int draws = 300;
-  for (const bool is_rare : {false, true}) {
+  struct Kind {
+    bool is_rare;
+    double difference;
+  };
+  for (const auto& [is_rare, difference] : {Kind{false, 0.3}, Kind{true, 0.3}, Kind{false, 4.0}}) {
     Noise random(7);
     double sum = 0.0;
     double squares = 0.0;
@@ -119,7 +124,7 @@ TEST(CrossValidation, StandardErrorIsTheSpreadOverDraws) {
       Eigen::MatrixXd found(n, 1);
       for (Eigen::Index i = 0; i < n; ++i) {
         other(i, 0) = random.normal() * (is_rare && i % 25 == 0 ? 5.0 : 1.0);
-        found(i, 0) = other(i, 0) + 0.3 * std::sin(0.7 * static_cast<double>(i));
+        found(i, 0) = other(i, 0) + difference * std::sin(0.7 * static_cast<double>(i));
       }
       const Advantage own = advantage(found, other, Eigen::VectorXd::Constant(1, 100.0), 1.0);
       sum += own.log_likelihood;
@@ -127,9 +132,8 @@ TEST(CrossValidation, StandardErrorIsTheSpreadOverDraws) {
       variances += own.standard_error * own.standard_error;
     }
     const double spread = std::sqrt(squares / draws - sum / draws * (sum / draws));
-    // A standard deviation of 300 draws has a standard error of 4 %. What the difference is in the mean counts as
-    // spread.
-    EXPECT_NEAR(std::sqrt(variances / draws), spread, 0.15 * spread) << is_rare;
+    // A standard deviation of 300 draws has a standard error of 4 %.
+    EXPECT_NEAR(std::sqrt(variances / draws), spread, 0.15 * spread) << is_rare << " " << difference;
   }
 }
 
@@ -272,6 +276,19 @@ TEST(Contests, TermsStandInThePlaceOfAShapeIfTheyAreCertain) {
   EXPECT_EQ(families_after(log, shape, none), Families{smooth->family});
 }
 
+TEST(Contests, CertainTermsStandInThePlaceOfTentativeOnes) {
+  const Log log;
+  using Families = std::vector<std::string>;
+  Missing tentative = log.answer({"cube"});
+  tentative.answer = Answer::unknown;
+  tentative.found[0].confirmed = false;
+  tentative.gaps[0].known_noise = noise;  // nothing is left for regimes
+  Missing terms = log.answer({"square", "linear"});
+  EXPECT_EQ(families_after(log, tentative, terms), (Families{"square", "linear"}));
+  terms.found[1].confirmed = false;
+  EXPECT_EQ(families_after(log, tentative, terms), Families{"cube"});
+}
+
 TEST(Contests, EachAppliesToWhatItLeavesOut) {
   const Log log;
   using Searches = std::vector<std::string>;
@@ -287,6 +304,16 @@ TEST(Contests, EachAppliesToWhatItLeavesOut) {
 
   const std::string shape = std::ranges::find_if(log.terms, &ModelTerm::generic)->family;
   EXPECT_EQ(left_out_for(log, log.answer({"square", shape}), regimes)[0], "shapes regimes ");
+
+  // Each of the terms of a tentative answer, then all with a constant. Of several, regimes are tried.
+  Missing tentative = log.answer({"square", "saturation"});
+  tentative.found[0].confirmed = false;
+  EXPECT_EQ(left_out_for(log, tentative, regimes),
+            (Searches{"square regimes ", "saturation regimes ", "saturation regimes ", ""}));
+  // Of more than four it is no longer one taken for another.
+  tentative = log.answer({"square", "cube", "linear", "offset", "gain"});
+  tentative.found[0].confirmed = false;
+  EXPECT_EQ(left_out_for(log, tentative, regimes), Searches{""});
 
   // Something is left: regimes are no longer left out.
   Missing unknown = log.answer({"square"});

@@ -74,8 +74,8 @@ TEST(ErrorsOfInputs, DoNotShrinkACoefficientWhereTheyAreTold) {
   EXPECT_LT(chi_squared, quantile);
 }
 
-// y = x + 2 tanh(x/0.2), and the least width that may stand for 0.2 is 0.25: what would make it smaller must not go into
-// the coefficient.
+// y = x + 2 tanh(x/0.2), and the least width that may stand for 0.2 is 0.25: what would make it smaller must not go
+// into the coefficient.
 TEST(ErrorsOfInputs, LeaveACoefficientAsItIsBesideAConstantAtItsEnd) {
   constexpr double least = 0.25;
   Noise noise(1);

@@ -99,35 +99,49 @@ struct Others {
   Left left_out;
 };
 
-// Nothing where the contest does not apply.
-using OthersOf = std::optional<Others> (*)(const Missing&, const Terms&, const Left& refuted);
+// Each is searched by itself, and meets who won before; none where the contest does not apply.
+using OthersOf = std::vector<Others> (*)(const Missing&, const Terms&, const Left& refuted);
 
 // A state filters the simulated output, errors of the inputs too, so that its standard error alone is no proof.
-std::optional<Others> all(const Missing& found, const Terms& terms, const Left&) {
-  if (found.answer != Answer::inner_state) return std::nullopt;
-  return Others{terms, with({}, terms, [](const ModelTerm&) { return true; })};
+std::vector<Others> all(const Missing& found, const Terms& terms, const Left&) {
+  if (found.answer != Answer::inner_state) return {};
+  return {{terms, with({}, terms, [](const ModelTerm&) { return true; })}};
 }
 
-std::optional<Others> states(const Missing& found, const Terms& terms, const Left& refuted) {
-  if (found.answer != Answer::inner_state) return std::nullopt;
-  return Others{terms, with(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); })};
+std::vector<Others> states(const Missing& found, const Terms& terms, const Left& refuted) {
+  if (found.answer != Answer::inner_state) return {};
+  return {{terms, with(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); })}};
 }
 
 // A shape has so many numbers that it explains more than the term that acts, noise and outliers among it.
-std::optional<Others> shapes(const Missing& found, const Terms& terms, const Left& refuted) {
-  if (!has_shapes(found)) return std::nullopt;
-  return Others{terms, with(refuted, terms, [](const ModelTerm& term) { return term.generic; })};
+std::vector<Others> shapes(const Missing& found, const Terms& terms, const Left& refuted) {
+  if (!has_shapes(found)) return {};
+  return {{terms, with(refuted, terms, [](const ModelTerm& term) { return term.generic; })}};
 }
 
-std::optional<Others> constants(const Missing& found, const Terms& terms, const Left& refuted) {
+// A search goes one term after another. Where it took one for another, what it found beside it is wrong too, and no
+// exchange of one term for one leads back.
+std::vector<Others> each_left_out(const Missing& found, const Terms& terms, const Left& refuted) {
+  constexpr std::size_t most = 4;  // more approximate what was not tried
+  std::vector<Others> others;
+  if (is_certain(found) || found.answer == Answer::inner_state || found.found.size() > most) return others;
+  for (const FoundTerm& term : found.found) {
+    if (term.generic) continue;
+    others.push_back({terms, refuted});
+    others.back().left_out.insert(term.term);
+  }
+  return others;
+}
+
+std::vector<Others> constants(const Missing& found, const Terms& terms, const Left& refuted) {
   std::set<std::vector<std::string>> places;
   for (const FoundTerm& term : found.found) {
     if (!term.generic && term.constants.size() > 0 && term.inputs.size() == 1) places.insert(term.inputs);
   }
-  if (places.empty() || found.answer == Answer::inner_state) return std::nullopt;
-  return Others{terms, with(refuted, terms, [&](const ModelTerm& term) {
-                  return places.contains(term.inputs) && !term.constants.empty();
-                })};
+  if (places.empty() || found.answer == Answer::inner_state) return {};
+  return {{terms, with(refuted, terms, [&](const ModelTerm& term) {
+             return places.contains(term.inputs) && !term.constants.empty();
+           })}};
 }
 
 Left without(const Left& left, const Left& others) {
@@ -143,27 +157,27 @@ bool is_part_of(const ModelTerm& in_regime, const FoundTerm& found) {
 }
 
 // Terms without constants find the input and the threshold, and those that were found everywhere.
-std::optional<Others> plain_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
+std::vector<Others> plain_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
   const Left regimes = terms_of_regimes(terms);
   // Several terms may imitate one that acts in a part.
-  if (regimes.empty() || !(leaves_something(found) || found.found.size() > 1)) return std::nullopt;
-  return Others{terms, with(without(refuted, regimes), terms, [&](const ModelTerm& term) {
-                  return !term.regime.empty() && term.constants.size() > 1 &&
-                         std::ranges::none_of(found.found, [&](const FoundTerm& own) { return is_part_of(term, own); });
-                })};
+  if (regimes.empty() || !(leaves_something(found) || found.found.size() > 1)) return {};
+  return {{terms, with(without(refuted, regimes), terms, [&](const ModelTerm& term) {
+             return !term.regime.empty() && term.constants.size() > 1 &&
+                    std::ranges::none_of(found.found, [&](const FoundTerm& own) { return is_part_of(term, own); });
+           })}};
 }
 
 // "where x > c".
 std::string gate_of(const std::string& location) { return location.substr(location.find("where ")); }
 
 // All terms, beyond the thresholds that were found.
-std::optional<Others> same_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
+std::vector<Others> same_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
   std::map<std::string, std::set<double>> thresholds;
   for (const FoundTerm& term : found.found) {
     if (term.regime.empty()) continue;
     thresholds[gate_of(term.location)].insert(term.constants(term.constants.size() - 1));
   }
-  if (thresholds.empty()) return std::nullopt;
+  if (thresholds.empty()) return {};
   Others others{terms, without(refuted, terms_of_regimes(terms))};
   for (std::size_t t = 0; t < terms.size(); ++t) {
     if (terms[t].regime.empty()) continue;
@@ -174,7 +188,7 @@ std::optional<Others> same_regimes(const Missing& found, const Terms& terms, con
       others.terms[t].constants.back().tried.assign(own->second.begin(), own->second.end());
     }
   }
-  return others;
+  return {others};
 }
 
 // Terms and the values of their constants were chosen on all rows: a term costs the logarithm of the number of those
@@ -204,12 +218,26 @@ bool any_answer(const Missing&) { return true; }
 bool names(const Missing& other) { return !other.found.empty() && is_certain(other); }
 
 // Regimes last, because they are tried where everything else leaves something.
-constexpr std::array<Contest, 6> contests = {{{"no states", states, any_answer},
+constexpr std::array<Contest, 7> contests = {{{"no states", states, any_answer},
                                               {"no terms", all, any_answer},
                                               {"no shapes", shapes, names},
+                                              {"no such term", each_left_out, names},
                                               {"no searched constants", constants, any_answer},
                                               {"regimes", plain_regimes, any_answer},
                                               {"terms of these regimes", same_regimes, any_answer}}};
+
+Missing winner(Missing found, Missing other, const Terms& terms, const CrossValidation& validation) {
+  Eigen::VectorXd floors(std::ssize(found.gaps));
+  for (std::size_t o = 0; o < found.gaps.size(); ++o) {
+    floors(static_cast<Eigen::Index>(o)) = std::max(found.gaps[o].noise_floor, other.gaps[o].noise_floor);
+  }
+  const double share = std::max(found.time.independent_share, other.time.independent_share);
+  // What is uncertain by one of the two answers counts as uncertain.
+  const Eigen::MatrixXd weights = found.weights.cwiseMin(other.weights);
+  Advantage of_other = advantage(validation.errors(found, weights), validation.errors(other, weights), floors, share);
+  of_other.log_likelihood -= cost_of_choice(other, terms) - cost_of_choice(found, terms);
+  return better_of(std::move(found), std::move(other), of_other);
+}
 
 }  // namespace
 
@@ -246,23 +274,13 @@ Missing better_of(Missing found, Missing other, const Advantage& of_other) {
 Missing contested(Missing found, const Terms& terms, const Left& refuted, const CrossValidation& validation,
                   const std::function<Missing(const Terms&, const Left&)>& search) {
   for (const Contest& contest : contests) {
-    const std::optional<Others> others = contest.others(found, terms, refuted);
-    if (!others) continue;
-    Missing other = search(others->terms, others->left_out);
-    const bool competes = other.answer != Answer::failed_held_out && beyond_constants(other, terms).empty() &&
-                          !(has_shapes(other) && !has_shapes(found)) && !has_same_terms(found, other) &&
-                          contest.may_win(other);
-    if (!competes) continue;
-    Eigen::VectorXd floors(std::ssize(found.gaps));
-    for (std::size_t o = 0; o < found.gaps.size(); ++o) {
-      floors(static_cast<Eigen::Index>(o)) = std::max(found.gaps[o].noise_floor, other.gaps[o].noise_floor);
+    for (const Others& others : contest.others(found, terms, refuted)) {
+      Missing other = search(others.terms, others.left_out);
+      const bool competes = other.answer != Answer::failed_held_out && beyond_constants(other, terms).empty() &&
+                            !(has_shapes(other) && !has_shapes(found)) && !has_same_terms(found, other) &&
+                            contest.may_win(other);
+      if (competes) found = winner(std::move(found), std::move(other), terms, validation);
     }
-    const double share = std::max(found.time.independent_share, other.time.independent_share);
-    // What is uncertain by one of the two answers counts as uncertain.
-    const Eigen::MatrixXd weights = found.weights.cwiseMin(other.weights);
-    Advantage of_other = advantage(validation.errors(found, weights), validation.errors(other, weights), floors, share);
-    of_other.log_likelihood -= cost_of_choice(other, terms) - cost_of_choice(found, terms);
-    found = better_of(std::move(found), std::move(other), of_other);
   }
   return found;
 }
