@@ -132,7 +132,10 @@ std::vector<std::string> without_accidental_words(const LearningArguments& argum
     const TableFiles::DifferentWords found = table.different_words(name, most);
     const bool dates = report::are_dates(found.words);
     const auto rule = report::accidental_words(found.words, table.rows());
-    if (found.are_all ? !rule || !rule->is_left_out : !dates) continue;
+    if (found.are_all ? !rule || !rule->is_left_out : !dates) {
+      if (found.are_all && rule) say_of_words(*rule, name, found.words.size(), table.rows(), asking_option(arguments));
+      continue;
+    }
     kept.pop_back();
     left_out.emplace_back(
         name, fmt::format("{}{}", found.are_all ? "" : "more than ", found.are_all ? found.words.size() : most));

@@ -67,6 +67,25 @@ TEST(ArrowProgram, DatesAreLeftOutAsThoseOfTextAre) {
   expect_refusal(folder.run(llmt_program + " fit d.arrow -t when"), 1, "column \"when\" holds no numbers");
 }
 
+TEST(ArrowProgram, DatesOfFewDaysAreSaidAsThoseOfTextAre) {
+  const Folder folder;
+  std::string file = arrow_files::dated_rows();
+  const std::size_t first = file.find(std::string("\x33\x4d\0\0\x34\x4d\0\0", 8));  // 32-bit days, 24 in a row
+  ASSERT_NE(first, std::string::npos);
+  for (std::size_t row = 0; row < 24; ++row) file[first + 4 * row] = static_cast<char>('\x33' + row % 3);
+  folder.write("d.arrow", file);
+  const std::string said =
+      "llmt: column \"when\" has words, 3 different ones in 24 rows, and is taken for categories; it looks like a "
+      "date: "
+      "leave it out (--ignore when) or give a number, as days; --inputs says that categories are meant\n";
+  for (const char* command : {"fit d.arrow -t y -o m.json", "compare d.arrow -t y"}) {
+    const Outcome outcome = folder.run(llmt_program + " " + command);
+    EXPECT_EQ(outcome.exit_code, 0);
+    EXPECT_EQ(outcome.err, said) << command;
+  }
+  EXPECT_EQ(folder.run(llmt_program + " fit d.arrow -t y --inputs when,x -o m.json").err, "");
+}
+
 TEST(ArrowProgram, TablesOfOtherFormatsAreNamed) {
   const Folder folder;
   const std::string zeros(100, '\0');
