@@ -177,40 +177,4 @@ TEST(SearchDeletion, ASetThatCollapsesWithADroppedSampleEndsTheSearchForOutliers
   }
 }
 
-// The residuals are the difference of two candidates that are nearly the same, so that neither explains anything alone.
-// Five others explain a little, and come first.
-TEST(SearchMoves, GoesOnFromWhatWasFoundBefore) {
-  constexpr Eigen::Index samples = 400;
-  llmt::Random random(5);
-  const auto draw = [&] {
-    Eigen::VectorXd values(samples);
-    for (double& value : values) value = random.normal();
-    return values;
-  };
-  const Eigen::VectorXd common = draw();
-  const Eigen::VectorXd difference = draw();
-  Case data;
-  data.evidence.jacobian = Eigen::MatrixXd::Ones(samples, 1);
-  data.evidence.residuals = difference + 0.3 * draw();
-  const auto add = [&](const std::string& family, const Eigen::VectorXd& signature) {
-    EffectCandidate candidate;
-    candidate.family = family;
-    candidate.location = "x";
-    candidate.signature = signature;
-    data.candidates.push_back(std::move(candidate));
-  };
-  for (int k = 0; k < 5; ++k) add("other" + std::to_string(k), 0.25 * data.evidence.residuals + draw());
-  add("first", common + 0.01 * difference);
-  add("second", common);
-  const auto families = [&] {
-    std::set<std::string> found;
-    for (const Finding& finding : search(data.evidence, data.candidates, {}).findings) found.insert(finding.family);
-    return found;
-  };
-  const std::set<std::string> both = {"first", "second"};
-  EXPECT_FALSE(families().contains("first"));
-  data.evidence.found_before = {6, 5};
-  EXPECT_EQ(families(), both);
-}
-
 }  // namespace

@@ -311,9 +311,6 @@ TEST(SearchErrors, NameWhatIsWrong) {
   bad = good;
   bad.evidence.repeats = {1, 2};
   EXPECT_NE(message(bad).find("repeats has 2 entries, must be 10"), std::string::npos);
-  bad = good;
-  bad.evidence.found_before = {0, bad.candidates.size()};
-  EXPECT_NE(message(bad).find("found_before has candidate 3, there are 3"), std::string::npos) << message(bad);
   SearchOptions options;
   options.false_alarm_rate = 0.5;
   EXPECT_NE(message(good, options).find("false_alarm_rate is 0.5"), std::string::npos);

@@ -21,8 +21,8 @@ namespace llmt::discovery {
 ///      N ln(RSS_A / (N - k_A)) + k_A ln N + 2 sum_f (ln n_fam + ln binomial(n_loc(f), n_used(f))),
 ///    N = n d - rank, the sum over the families f in A. This is Schwarz's criterion plus the logarithm of the number of
 ///    sets of the same kind. Values must lie within their limits, up to two standard errors. The search adds, drops and
-///    swaps candidates; it starts from the empty set, from the best single candidates of different families, from
-///    whole families, and from what was found before.
+///    swaps candidates; it starts from the empty set, from the best single candidates of different families, and from
+///    whole families.
 /// 3. A sample is an outlier if leaving it out lowers the score by more than a free shift of its mean costs.
 /// 4. The gain over no explanation must exceed what the best single candidate gains by chance (max-T): in normally
 ///    distributed noise, and in the residuals with random signs, both projected in the same way.
@@ -32,8 +32,7 @@ namespace llmt::discovery {
 /// 7. For each family, the other families that explain as well in its place are listed.
 /// 8. Findings are confirmed unless generic candidates explain a material share, or more is left than repeats scatter.
 ///
-/// Deterministic. Throws std::invalid_argument for wrong shapes, values that are not finite, no samples, and a
-/// candidate found before that is none.
+/// Deterministic. Throws std::invalid_argument for wrong shapes, values that are not finite, and no samples.
 Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& candidates,
                const SearchOptions& options = {});
 

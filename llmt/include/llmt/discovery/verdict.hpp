@@ -31,8 +31,6 @@ struct Evidence {
   double independent_share = 1.0;
   /// n numbers, or empty: samples of equal number keep their signs together in the simulated null of random signs.
   std::vector<Eigen::Index> clusters = {};
-  /// Indices of the candidates that an earlier search of the same effects has found; one more set to start from.
-  std::vector<std::size_t> found_before = {};
 
   Eigen::Index samples() const { return components > 0 ? residuals.size() / components : 0; }
 };

@@ -143,7 +143,6 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   question.evidence.clusters = clusters_of(data);
   Slots slots;
   for (const PlacedTerm& placed : fit.placed) {
-    question.evidence.found_before.push_back(question.options.size());
     question.options.push_back(placed);
     question.candidates.push_back(candidate_of(model, data, placed, simulated, slots.next(model, placed), noise));
     question.evidence.residuals += question.candidates.back().signature * placed.coefficients;

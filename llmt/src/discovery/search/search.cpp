@@ -41,11 +41,6 @@ void check(const Evidence& evidence, const std::vector<EffectCandidate>& candida
   if (!evidence.clusters.empty() && std::ssize(evidence.clusters) != evidence.samples()) {
     refuse(fmt::format("clusters has {} entries, must be {}", evidence.clusters.size(), evidence.samples()));
   }
-  for (const std::size_t candidate : evidence.found_before) {
-    if (candidate >= candidates.size()) {
-      refuse(fmt::format("found_before has candidate {}, there are {}", candidate, candidates.size()));
-    }
-  }
   if (!evidence.residuals.allFinite()) refuse("a residual is not finite");
   if (!evidence.jacobian.allFinite()) refuse("an entry of the jacobian is not finite");
   if (!(options.false_alarm_rate > 0.0 && options.false_alarm_rate < 0.1)) {
@@ -140,9 +135,7 @@ Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& can
   Workspace workspace = full;
   workspace.drop(competing_outliers(full, candidates, options.largest_set, largest));
   Verdict verdict;
-  const std::set<std::size_t> before(evidence.found_before.begin(), evidence.found_before.end());
-  Explained found =
-      choose(Scoring(workspace, candidates), {before.begin(), before.end()}, options, verdict.causes_preferred);
+  Explained found = choose(Scoring(workspace, candidates), {}, options, verdict.causes_preferred);
   // The outliers depend on the explanation, and the explanation on the outliers.
   for (int round = 0; round < 3; ++round) {
     std::vector<std::size_t> outliers = outliers_given(full, candidates, found.set, largest);
