@@ -45,7 +45,8 @@ def test_same_bytes_for_any_number_of_threads_and_any_kind_of_table():
     columns = {"a": X[:, 0], "b": X[:, 1], "c": X[:, 2], "d": words.tolist()}
     frame = pandas.DataFrame(columns)
     tables = [frame, polars.DataFrame(columns, nan_to_null=True), pyarrow.table(columns)]
-    texts = {quick(n_jobs=jobs).fit(table, y).to_json() for table in tables for jobs in (1, 2, 5)}
+    pairs = [(tables[0], 1), (tables[0], 2), (tables[0], 5), (tables[1], 1), (tables[2], 5)]
+    texts = {quick(n_jobs=jobs).fit(table, y).to_json() for table, jobs in pairs}
     assert len(texts) == 1
     fitted = quick().fit(frame, y)
     assert fitted.model_.to_dict()["inputs"][3]["levels"] == ["down", "up"]
@@ -250,7 +251,7 @@ except KeyboardInterrupt:
 def test_ctrl_c_ends_a_fit():
     child = subprocess.Popen([sys.executable, "-c", INTERRUPTED], stdout=subprocess.PIPE, text=True)
     assert child.stdout.readline() == "ready\n"
-    time.sleep(1.5)
+    time.sleep(0.8)
     child.send_signal(signal.SIGINT)
     output, _ = child.communicate(timeout=60)
     assert output == "interrupted 0\n"

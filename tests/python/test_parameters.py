@@ -52,11 +52,17 @@ def tree(**parameters):
     return LocalLinearTreeRegressor(**{**FEW_FOLDS, **parameters})
 
 
+def inputs(name):
+    """The columns that the parameter is tried with: all where inputs of noise matter, few where fits take long with many."""
+    return {"select_features": "abcdefghijkl", "teach": "abcd"}.get(name, "abcdef")
+
+
 @functools.cache
-def fitted_by_default(estimator, columns="", targets=1):
-    """Columns: letters of those that are inputs; all by default."""
-    X, y = table(targets)
-    return (tree() if estimator is LocalLinearTreeRegressor else estimator()).fit(X[list(columns)] if columns else X, y)
+def fitted(estimator, columns, targets=1, name="", rows=300):
+    """The estimator with the value above of a parameter, by default with none, fitted to a part of the table."""
+    X, y = (part.head(rows) for part in table(targets))
+    values = TREE if estimator is tree else SUM
+    return estimator(**({name: values[name]} if name else {})).fit(X[list(columns)], y)
 
 
 def test_the_values_are_those_of_all_parameters():
@@ -70,11 +76,9 @@ def test_the_values_are_those_of_all_parameters():
 @pytest.mark.parametrize("name", TREE)
 def test_a_parameter_of_a_tree_changes_the_fit(name):
     targets = 2 if name == "shared_tree" else 1
-    columns = {"local_models": "abcdef", "teach": "abcd"}.get(name, "")  # these take long with many inputs
-    X, y = table(targets)
-    X = X[list(columns)] if columns else X
-    by_default = fitted_by_default(LocalLinearTreeRegressor, columns, targets)
-    changed = tree(**{name: TREE[name]}).fit(X, y)
+    rows = 150 if name == "teach" else 300
+    by_default = fitted(tree, inputs(name), targets, rows=rows)
+    changed = fitted(tree, inputs(name), targets, name, rows)
     if name == "teach":  # the taught tree is taken where it is better
         assert "teaching" in changed.summary_ and "teaching" not in by_default.summary_
     else:
@@ -84,9 +88,8 @@ def test_a_parameter_of_a_tree_changes_the_fit(name):
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", SUM)
 def test_a_parameter_of_a_sum_changes_the_fit(name):
-    X, y = table()
-    by_default = fitted_by_default(BoostedLocalLinearTreeRegressor).to_json()
-    changed = BoostedLocalLinearTreeRegressor(**{name: SUM[name]}).fit(X, y).to_json()
+    by_default = fitted(BoostedLocalLinearTreeRegressor, "abcd", rows=150).to_json()
+    changed = fitted(BoostedLocalLinearTreeRegressor, "abcd", name=name, rows=150).to_json()
     assert (changed == by_default) == (name in WITHOUT_EFFECT)
 
 
@@ -94,6 +97,7 @@ def test_a_parameter_of_a_sum_changes_the_fit(name):
 @pytest.mark.parametrize("name", TREE)
 def test_beyond_one_memory_a_parameter_means_what_it_means_in_fit(name):
     X, y = table()
+    X = X[list(inputs(name))]
     estimator = tree(**{name: TREE[name]})
     try:
         state = distributed.start(list(X.columns), "y", block_rows=120, estimator=estimator)
@@ -103,7 +107,7 @@ def test_beyond_one_memory_a_parameter_means_what_it_means_in_fit(name):
         return
     while distributed.status(state)["step"] != "finished":
         state = distributed.advance(state, distributed.sums(state, X, y))
-    assert distributed.estimator(state).to_json() == estimator.fit(X, y).to_json()
+    assert distributed.estimator(state).to_json() == fitted(tree, inputs(name), name=name).to_json()
 
 
 @pytest.mark.parametrize("name", TREE)
