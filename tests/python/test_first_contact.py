@@ -14,7 +14,7 @@ pandas = pytest.importorskip("pandas")
 polars = pytest.importorskip("polars")
 pyarrow = pytest.importorskip("pyarrow")
 
-ROWS = 500
+ROWS = 300
 RNG = np.random.default_rng(0)
 NUMBERS = RNG.uniform(-1, 1, (ROWS, 4))
 WORDS = np.asarray(["red", "green", "größe <m>"])[RNG.integers(0, 3, ROWS)]

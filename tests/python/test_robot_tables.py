@@ -36,8 +36,8 @@ def test_ctrl_c_ends_long_tables(arm, task, tables):
     table = tables["points" if task == "compensate without joints" else "all"]
     call = {"predict": robotics.predict, "simulate": robotics.simulate}.get(task, robotics.compensate)
     before = _threads()
-    for _ in range(3):
-        timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+    for after in (0.05, 0.1, 0.3):
+        timer = threading.Timer(after, lambda: os.kill(os.getpid(), signal.SIGINT))
         timer.start()
         with pytest.raises(KeyboardInterrupt):
             for _ in range(1000):

@@ -59,21 +59,18 @@ def without_record(description):
     return re.sub(r"^  made_from:\n(    .*\n)+", "", description, flags=re.MULTILINE)
 
 
-def test_discover_is_that_of_the_command(found):
-    assert without_files(found.to_dict()) == without_files(json.loads(command("discover", "arm.yaml", "arm_measured.csv", "--json")))
+def test_discover_and_its_improved_robot_are_those_of_the_command(found, tmp_path):
+    printed = command("discover", "arm.yaml", "arm_measured.csv", "--json", "-o", tmp_path / "improved.yaml")
+    assert without_files(found.to_dict()) == without_files(json.loads(printed))
+    found.save(tmp_path / "saved.yaml")
+    improved, saved = ((tmp_path / name).read_text() for name in ("improved.yaml", "saved.yaml"))
+    assert without_record(improved) != improved
+    assert without_record(saved) == without_record(improved)
 
 
 def test_discover_prints_the_page_of_the_command(found):
     page = command("discover", "arm.yaml", "arm_measured.csv")
     assert str(found).replace("measured:", "arm_measured.csv:", 1) == page
-
-
-def test_improved_robot_is_that_of_the_command(found, tmp_path):
-    command("discover", "arm.yaml", "arm_measured.csv", "-o", tmp_path / "improved.yaml")
-    found.save(tmp_path / "saved.yaml")
-    improved, saved = ((tmp_path / name).read_text() for name in ("improved.yaml", "saved.yaml"))
-    assert without_record(improved) != improved
-    assert without_record(saved) == without_record(improved)
 
 
 def test_the_record_says_what_a_result_was_made_from(tmp_path, monkeypatch):
@@ -135,11 +132,17 @@ def test_calibrate_is_that_of_the_command(calibrated):
     assert len(calibrated.parameters) == len(expected["parameters"])
 
 
-def test_poses_are_those_of_the_command(arm):
-    chosen = robotics.poses(arm, count=12, seed=2)
+@pytest.fixture(scope="module")
+def chosen(arm):
+    return robotics.poses(arm, count=12, seed=2)
+
+
+def test_poses_are_those_of_the_command(chosen, tmp_path):
     expected = json.loads(command("poses", "arm.yaml", "--count", 12, "--seed", 2, "--json"))
     assert without_files(chosen.to_dict()) == without_files(expected)
     assert chosen.poses.shape == (12, 6)
+    with pytest.raises(OSError, match="no_such_folder"):
+        chosen.save(tmp_path / "no_such_folder" / "poses.csv")
 
 
 def test_simulated_and_predicted_tables_are_those_of_the_command():
@@ -398,11 +401,10 @@ def test_targets_out_of_reach_are_warned_of(arm):
     assert list(done.commands.outcome) == ["reached", "unreachable"]
 
 
-def test_every_result_is_shown_in_a_notebook(arm, calibrated):
+def test_every_result_is_shown_in_a_notebook(arm, calibrated, chosen):
     later = robotics.check(calibrated.robot, robotics.simulate(calibrated.robot, 20, noise_um=20.0, seed=9))
     assert later.summary.startswith("STILL GOOD.") and later.summary in later._repr_html_()
-    chosen = robotics.poses(arm, count=10)
-    assert chosen._repr_html_().count("<tr>") == 2 + 11  # what is expected, and the poses
+    assert chosen._repr_html_().count("<tr>") == 2 + 13  # what is expected, and the poses
     done = robotics.compensate(calibrated.robot, chosen.poses[:2] * 0.5, nominal=arm)
     assert done._repr_html_().count("reached</td>") == 2
     assert "<table>" in arm._repr_html_() and "falls from" in calibrated._repr_html_()

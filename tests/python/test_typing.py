@@ -18,14 +18,20 @@ def mypy(tmp_path_factory):
     pytest.importorskip("mypy")
     folder = tmp_path_factory.mktemp("mypy")  # with a cache that the tests share: most of the time is NumPy's
 
-    def run(source, *options):
-        command = [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", *options, str(source)]
+    def run(*source):
+        command = [sys.executable, "-m", "mypy", "--config-file", HERE.parents[1] / "pyproject.toml", *source]
         done = subprocess.run(
             command, capture_output=True, text=True, env=os.environ | {"MYPYPATH": str(PACKAGE.parent)}, cwd=folder
         )
         return done.returncode, done.stdout + done.stderr
 
     return run
+
+
+def test_the_package_and_the_stub_of_its_extension_pass_strictly(mypy):
+    assert (PACKAGE / "py.typed").exists() and (PACKAGE / "_core.pyi").exists()
+    code, said = mypy("-p", "llmt")
+    assert code == 0, said
 
 
 def test_a_program_that_uses_the_package_passes_strictly(mypy):
@@ -39,13 +45,3 @@ def test_a_wrong_use_is_found(mypy, tmp_path):
     code, said = mypy(wrong)
     assert code == 1
     assert "wrong.py:3" in said and "wrong.py:4" in said, said
-
-
-def test_the_package_and_the_stub_of_its_extension_pass_strictly(tmp_path):
-    pytest.importorskip("mypy")
-    assert (PACKAGE / "py.typed").exists() and (PACKAGE / "_core.pyi").exists()
-    command = [sys.executable, "-m", "mypy", "--config-file", HERE.parents[1] / "pyproject.toml", "-p", "llmt"]
-    done = subprocess.run(
-        command, capture_output=True, text=True, env=os.environ | {"MYPYPATH": str(PACKAGE.parent)}, cwd=tmp_path
-    )
-    assert done.returncode == 0, done.stdout + done.stderr

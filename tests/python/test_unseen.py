@@ -118,7 +118,7 @@ def test_a_saved_model_reads_missing_words(tmp_path):
 
 def test_many_categories_are_fitted_by_a_sum():
     random = np.random.default_rng(1)
-    shop = np.arange(60 * 15) % 60
+    shop = np.arange(60 * 4) % 60
     X = pd.DataFrame({"shop": [f"s{k}" for k in shop], "x": random.uniform(size=len(shop))})
     y = shop % 7 + X["x"].to_numpy()
     fitted = BoostedLocalLinearTreeRegressor(n_jobs=1).fit(X, y)
