@@ -91,6 +91,32 @@ TEST(FilteredRows, AJumpBetweenRowsCountsWhereItIs) {
   }
 }
 
+// Columns of signals() went through the filter once, so what is linear in them is right as it stands: of an
+// acceleration near the cutoff a second filter takes a part away. What jumps with a speed is right behind the filter
+// alone.
+TEST(FilteredRows, TheSimulationIsFilteredWhereThatIsRight) {
+  const auto shaken = [](double t) -> Eigen::Vector3d {
+    const double w = 2.0 * 3.14159 * 4.5;  // the cutoff is 6 Hz
+    return motion(t) + 0.02 * Eigen::Vector3d(std::sin(w * t), w * std::cos(w * t), -w * w * std::sin(w * t));
+  };
+  const Model linear;
+  const auto at_once = [&](double t) { return linear.torque(shaken(t)); };
+  const Missing missing = missing_from(rows_of_log(1, linear, 0.05, at_once, {.cutoff = 6.0}, shaken));
+  EXPECT_EQ(missing.answer, Answer::nothing_missing) << to_string(missing.answer);
+  EXPECT_FALSE(missing.time.filtered);
+  EXPECT_LT(missing.gaps[0].after, 2.0 * missing.gaps[0].known_noise);
+  const Model dry{.dry = 2.0};
+  const Missing rounded = missing_from(rows_of_log(1, dry, 0.05, [&](double t) { return dry.torque(motion(t)); }));
+  EXPECT_TRUE(rounded.time.filtered);
+  // An effect that is missing does not decide it.
+  const Missing lacking = missing_from(rows_of_log(
+      1, linear, 0.05, [&](double t) { return at_once(t) + 0.8 * shaken(t)(0); }, {.cutoff = 6.0}, shaken));
+  EXPECT_FALSE(lacking.time.filtered);
+  ASSERT_EQ(lacking.found.size(), 1u);
+  EXPECT_EQ(lacking.found[0].family + " " + lacking.found[0].location, "linear q");
+  EXPECT_NEAR(lacking.found[0].values[0].value, 0.8, 0.02);
+}
+
 // Dry friction that the model has: the filter of the log rounds it at every reversal.
 TEST(FilteredRows, ACompleteModelWithDryFrictionLacksNothing) {
   const Model model{.dry = 2.0};

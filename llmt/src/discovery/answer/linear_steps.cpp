@@ -215,7 +215,7 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
                               const MissingOptions& options) {
   const Linearisation linearisation(simulation, derivatives, inputs, measured);
   const Eigen::VectorXd start = values_of(simulation.parameters);
-  const Recording recording(inputs);
+  Recording recording(inputs);
   const Eigen::MatrixXd nominal = linearisation.outputs(start);
   refuse_random(nominal, linearisation.outputs(start), measured.names);
   Eigen::VectorXd values = start;
@@ -226,6 +226,7 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
   for (int step = 0; step < most_steps && !settled; ++step) {
     const Simulation linear = linearisation.at(values, outputs);
     missing = find_missing(linear, inputs, measured, terms, options);
+    if (recording.goes_through_filter() && !missing.time.filtered) recording = recording.with_plain_simulation();
     terms_added = added(linear, missing, recording);
     const double before = left(missing, measured, recording.as_measured(outputs) + terms_added);
     Eigen::VectorXd next = values_of(missing.parameters);

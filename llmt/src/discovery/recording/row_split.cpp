@@ -191,8 +191,14 @@ RowSplit split_filtered(const Recording& recording, const MissingOptions& option
     for (Eigen::Index k = 0; k < std::ssize(piece); ++k) places[piece[k]] = {p, k};
   }
   RowSplit split;
-  split.searched.set_crossings(filter.crossings());
-  split.held_out.set_crossings(filter.crossings());
+  split.reach = filter.weights();
+  Eigen::VectorXd weights = filter.weights();
+  if (recording.goes_through_filter()) {
+    split.searched.set_crossings(filter.crossings());
+    split.held_out.set_crossings(filter.crossings());
+  } else {
+    weights = Eigen::VectorXd::Unit(weights.size(), weights.size() / 2);
+  }
   split.step = filter.step() * static_cast<double>(filter.stride());
   const Eigen::Index half = filter.weights().size() / 2;
   Eigen::Index stretch = -1;
@@ -206,7 +212,7 @@ RowSplit split_filtered(const Recording& recording, const MissingOptions& option
       const Piece& piece = filter.pieces()[p];
       if (k % filter.stride() != 0 || k < half || k + half >= std::ssize(piece)) continue;
       const auto around = std::span(piece).subspan(k - half, filter.weights().size());
-      (segment.is_held_out ? split.held_out : split.searched).add(row, around, filter.weights());
+      (segment.is_held_out ? split.held_out : split.searched).add(row, around, weights);
       if (!segment.is_held_out) split.stretches.push_back(stretch);
     }
     before = &segment;
@@ -249,14 +255,15 @@ RowSplit split_in_time(const Recording& recording, const MissingOptions& options
 
 namespace {
 
-void keep(const Samples& from, const std::vector<bool>& apart, Samples& to, std::vector<bool>& kept) {
+void keep(const Samples& from, const Eigen::VectorXd& reach, const std::vector<bool>& apart, Samples& to,
+          std::vector<bool>& kept) {
   for (Eigen::Index i = 0; i < from.size(); ++i) {
     if (from.is_filtered()) {
       // Next to nothing of what is set apart may be in what is computed.
       constexpr double negligible = 0.02;
       double share = 0.0;
-      for (Eigen::Index k = 0; k < from.weights().size(); ++k) {
-        if (apart[from.around(i)[k]]) share += std::abs(from.weights()(k));
+      for (Eigen::Index k = 0; k < reach.size(); ++k) {
+        if (apart[from.around(i)[k]]) share += std::abs(reach(k));
       }
       kept.push_back(!apart[from.rows_of(i).front()] && share <= negligible);
       if (kept.back()) to.add(from, i);
@@ -272,6 +279,26 @@ void keep(const Samples& from, const std::vector<bool>& apart, Samples& to, std:
 
 }  // namespace
 
+bool is_plain(const RowSplit& split, const Eigen::MatrixXd& measured, const Eigen::MatrixXd& simulated) {
+  constexpr double errors = 2.0;
+  const Eigen::MatrixXd plain = means_of_filtered(simulated, split.searched);
+  const Eigen::MatrixXd changes = means(simulated, split.searched) - plain;
+  const Eigen::MatrixXd deviations = means_of_filtered(measured, split.searched) - plain;
+  const Eigen::Index n = deviations.rows();
+  double information = 0.0;  // 1 / variance of lambda
+  double sum = 0.0;
+  for (Eigen::Index o = 0; o < deviations.cols() && n > 1; ++o) {
+    const double own = changes.col(o).squaredNorm();
+    if (!(own > 0.0)) continue;
+    const double lambda = changes.col(o).dot(deviations.col(o)) / own;
+    const double left = (deviations.col(o) - lambda * changes.col(o)).squaredNorm() / static_cast<double>(n - 1);
+    if (!(left > 0.0)) continue;
+    information += own / left;
+    sum += lambda * own / left;
+  }
+  return information > 0.0 && sum / information + errors / std::sqrt(information) < 0.5;
+}
+
 RowSplit without_rows(const RowSplit& split, const std::vector<bool>& apart) {
   RowSplit result = split;
   result.searched = {};
@@ -279,13 +306,13 @@ RowSplit without_rows(const RowSplit& split, const std::vector<bool>& apart) {
   result.repeats.clear();
   result.stretches.clear();
   std::vector<bool> kept;
-  keep(split.searched, apart, result.searched, kept);
+  keep(split.searched, split.reach, apart, result.searched, kept);
   for (std::size_t i = 0; i < kept.size(); ++i) {
     if (!kept[i]) continue;
     if (!split.repeats.empty()) result.repeats.push_back(split.repeats[i]);
     if (!split.stretches.empty()) result.stretches.push_back(split.stretches[i]);
   }
-  keep(split.held_out, apart, result.held_out, kept);
+  keep(split.held_out, split.reach, apart, result.held_out, kept);
   return result;
 }
 
