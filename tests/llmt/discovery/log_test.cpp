@@ -108,13 +108,6 @@ TEST(FilteredRows, TheSimulationIsFilteredWhereThatIsRight) {
   const Model dry{.dry = 2.0};
   const Missing rounded = missing_from(rows_of_log(1, dry, 0.05, [&](double t) { return dry.torque(motion(t)); }));
   EXPECT_TRUE(rounded.time.filtered);
-  // An effect that is missing does not decide it.
-  const Missing lacking = missing_from(rows_of_log(
-      1, linear, 0.05, [&](double t) { return at_once(t) + 0.8 * shaken(t)(0); }, {.cutoff = 6.0}, shaken));
-  EXPECT_FALSE(lacking.time.filtered);
-  ASSERT_EQ(lacking.found.size(), 1u);
-  EXPECT_EQ(lacking.found[0].family + " " + lacking.found[0].location, "linear q");
-  EXPECT_NEAR(lacking.found[0].values[0].value, 0.8, 0.02);
 }
 
 // Dry friction that the model has: the filter of the log rounds it at every reversal.

@@ -127,8 +127,10 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
         const double evidence =
             0.5 * samples * std::log(other.left / own.left) + 0.5 * (other.numbers - own.numbers) * std::log(samples);
         const double difference = (other.function - own.function).norm() / own.function.norm();
-        const bool contains_it = other.numbers > own.numbers && difference < hardly;
-        if (!(evidence <= likelihood_margin) || contains_it) continue;
+        // Of functions that differ by so little, rows whose signals were filtered cannot tell which one it is.
+        const bool is_same = difference < hardly;
+        const bool contains_it = other.numbers > own.numbers && is_same;
+        if (!(evidence <= likelihood_margin || is_same) || contains_it) continue;
         members.push_back({evidence, {.what = name_of(term), .inputs = term.inputs, .exact = false}});
         if (difference > farthest) {
           farthest = difference;
@@ -152,6 +154,66 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
 }
 
 namespace {
+
+bool is_simpler_at_the_same_inputs(const ModelTerm& term, const ModelTerm& than) {
+  return may_stand_for_another(term) && std::ranges::is_permutation(term.inputs, than.inputs) &&
+         term.output == than.output &&
+         term.coefficients.size() + term.constants.size() < than.coefficients.size() + than.constants.size();
+}
+
+// The search fits coefficients beside constants that are tried, so a term of more coefficients may have come first
+// although one that it contains is right. The best simpler term of the same inputs takes its place if, everything
+// fitted, it leaves no more than its fewer numbers are worth: phi N / 2 ln(S'/S) <= (k - k') / 2 ln(phi N).
+void take_simpler(const TermModel& model, const TermData& data, TermFit& fit, Missing& missing) {
+  constexpr double alike = 0.1;
+  const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
+  const double samples = data.independent_share * static_cast<double>(data.samples.size());
+  const auto left_by = [&](const TermFit& of) {
+    return scaled_residuals(model, data, of.parameters, of.placed).squaredNorm();
+  };
+  for (std::size_t k = 0; k < fit.placed.size(); ++k) {
+    const PlacedTerm placed = fit.placed[k];
+    const ModelTerm& own_term = model.terms()[placed.term];
+    if (!may_stand_for_another(own_term)) continue;
+    std::optional<Ground> place;
+    std::optional<TermFit> best;
+    double least = 0.0;
+    for (std::size_t t = 0; t < model.terms().size(); ++t) {
+      const ModelTerm& term = model.terms()[t];
+      if (!is_simpler_at_the_same_inputs(term, own_term)) continue;
+      if (!place) place.emplace(ground_without(model, data, fit, k));
+      const InPlace own = place->with(model, data, placed, simulated);
+      std::vector<PlacedTerm> options = {
+          {t, placed.output, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0}};
+      if (!term.constants.empty())
+        options = best_constants(model, data, place->ground(), t, placed.output, simulated, {});
+      for (PlacedTerm& option : options) {
+        const InPlace other = place->with(model, data, option, simulated);
+        if (!((other.function - own.function).norm() < alike * own.function.norm())) continue;
+        std::vector<PlacedTerm> others = fit.placed;
+        others[k] = std::move(option);
+        const TermFit fitted = fit_terms(model, data, fit.parameters, others);
+        const double evidence = 0.5 * samples * std::log(left_by(fitted) / left_by(fit)) +
+                                0.5 * (other.numbers - own.numbers) * std::log(samples);
+        if (!(evidence <= least)) continue;
+        least = evidence;
+        best = fitted;
+      }
+    }
+    if (!best) continue;
+    fit = std::move(*best);
+    FoundTerm simpler = described(model, fit.placed[k], fit.errors[k]);
+    FoundTerm& found = missing.found[k];
+    simpler.share = found.share;
+    simpler.shrinks_gap = found.shrinks_gap;
+    simpler.rivals = std::move(found.rivals);
+    simpler.confirmed = found.confirmed;
+    std::erase_if(simpler.rivals, [&](const RivalTerms& rival) {
+      return rival.what.starts_with(name_of(model.terms()[simpler.term]));
+    });
+    found = std::move(simpler);
+  }
+}
 
 // Sums keep the parts that the search has found.
 void move_parameters(const TermFit& fit, const TermFit& alone, double false_alarm_rate, Missing& missing) {
@@ -259,6 +321,7 @@ void fit_on_all_rows(const Simulation& simulation, const Recording& recording, c
   hold(model, data, start, placed);
   TermFit fit = fit_terms(model, data, start, placed);
   if (retry_constants(model, data, fit)) fit = fit_terms(model, data, fit.parameters, fit.placed);
+  take_simpler(model, data, fit, missing);
   place_thresholds_at_rest(model, measured, rows.at_rest, fit);
   const TermFit alone = fit_terms(model, data, start, {});
   set_trial_errors(model, data, fit);

@@ -19,6 +19,8 @@ std::string unit_of(const std::string& output, const std::string& per) {
   return output + "/" + per;
 }
 
+}  // namespace
+
 FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eigen::VectorXd& errors) {
   const ModelTerm& term = model.terms()[placed.term];
   FoundTerm found;
@@ -45,8 +47,6 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
   set_estimates(placed, errors, found);
   return found;
 }
-
-}  // namespace
 
 void set_estimates(const PlacedTerm& placed, const Eigen::VectorXd& errors, FoundTerm& found) {
   found.coefficients = placed.coefficients;

@@ -24,6 +24,9 @@ std::string option_label(const TermModel& model, const PlacedTerm& option);
 /// Coefficients and constants of a term that was found. `errors`: of its coefficients, then of its constants.
 void set_estimates(const PlacedTerm& placed, const Eigen::VectorXd& errors, FoundTerm& found);
 
+/// A term as it is placed. `errors`: of its coefficients, then of its constants.
+FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eigen::VectorXd& errors);
+
 /// Missing::found, not yet confirmed.
 void describe_findings(const TermModel& model, const Settled& settled, Missing& missing);
 

@@ -280,23 +280,11 @@ void keep(const Samples& from, const Eigen::VectorXd& reach, const std::vector<b
 }  // namespace
 
 bool is_plain(const RowSplit& split, const Eigen::MatrixXd& measured, const Eigen::MatrixXd& simulated) {
-  constexpr double errors = 2.0;
-  const Eigen::MatrixXd plain = means_of_filtered(simulated, split.searched);
-  const Eigen::MatrixXd changes = means(simulated, split.searched) - plain;
-  const Eigen::MatrixXd deviations = means_of_filtered(measured, split.searched) - plain;
-  const Eigen::Index n = deviations.rows();
-  double information = 0.0;  // 1 / variance of lambda
-  double sum = 0.0;
-  for (Eigen::Index o = 0; o < deviations.cols() && n > 1; ++o) {
-    const double own = changes.col(o).squaredNorm();
-    if (!(own > 0.0)) continue;
-    const double lambda = changes.col(o).dot(deviations.col(o)) / own;
-    const double left = (deviations.col(o) - lambda * changes.col(o)).squaredNorm() / static_cast<double>(n - 1);
-    if (!(left > 0.0)) continue;
-    information += own / left;
-    sum += lambda * own / left;
-  }
-  return information > 0.0 && sum / information + errors / std::sqrt(information) < 0.5;
+  constexpr double clearly = 2.0;
+  const Eigen::MatrixXd y = means_of_filtered(measured, split.searched);
+  const Eigen::VectorXd plain = (y - means_of_filtered(simulated, split.searched)).colwise().squaredNorm();
+  const Eigen::VectorXd filtered = (y - means(simulated, split.searched)).colwise().squaredNorm();
+  return (plain.array() > 0.0).all() && filtered.cwiseQuotient(plain).mean() > clearly;
 }
 
 RowSplit without_rows(const RowSplit& split, const std::vector<bool>& apart) {

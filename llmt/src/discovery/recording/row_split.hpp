@@ -21,9 +21,9 @@ struct RowSplit {
   Eigen::VectorXd reach = {};
 };
 
-/// Whether the simulation is to be taken as it stands at filtered rows (docs/algorithms/rows-in-time.md, "Filtered
-/// rows"): y = s + lambda (K s - s) + noise with lambda below 1/2 by two standard errors. `split`: without the rows
-/// that do not count; `simulated`: n x d at the rows.
+/// Whether the simulation is to be taken as it stands at filtered rows, because filtered it leaves more than twice as
+/// much, as a sum of squares, in the mean of the outputs (docs/algorithms/rows-in-time.md, "Filtered rows"). `split`:
+/// without the rows that do not count; `simulated`: n x d at the rows.
 bool is_plain(const RowSplit& split, const Eigen::MatrixXd& measured, const Eigen::MatrixXd& simulated);
 
 /// A row is a sample. Rows of equal inputs, the order aside, keep together.
