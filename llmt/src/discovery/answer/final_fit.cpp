@@ -183,10 +183,13 @@ void take_simpler(const TermModel& model, const TermData& data, TermFit& fit, Mi
       if (!is_simpler_at_the_same_inputs(term, own_term)) continue;
       if (!place) place.emplace(ground_without(model, data, fit, k));
       const InPlace own = place->with(model, data, placed, simulated);
-      std::vector<PlacedTerm> options = {
-          {t, placed.output, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0}};
-      if (!term.constants.empty())
+      PlacedTerm at_own{t, placed.output, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0};
+      if (term.constants.size() == own_term.constants.size()) at_own.constants = placed.constants;
+      std::vector<PlacedTerm> options;
+      if (!term.constants.empty()) {
         options = best_constants(model, data, place->ground(), t, placed.output, simulated, {});
+      }
+      if (at_own.constants.size() == std::ssize(term.constants)) options.push_back(std::move(at_own));
       for (PlacedTerm& option : options) {
         const InPlace other = place->with(model, data, option, simulated);
         if (!((other.function - own.function).norm() < alike * own.function.norm())) continue;
