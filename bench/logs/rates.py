@@ -106,6 +106,9 @@ def demands():
     yield "no answer", KINDS, lambda r: not answered(r)
     yield "failed on held-out rows", KINDS, lambda r: answered(r) and r["failed"]
     yield "right as a whole", KINDS, lambda r: answered(r) and r["right"]
+    in_loop = lambda r: r["structure"]["loop"]
+    yield "  where the motion is prescribed", KINDS, lambda r: None if in_loop(r) else answered(r) and r["right"]
+    yield "  in a loop with friction that sticks", KINDS, lambda r: answered(r) and r["right"] if in_loop(r) else None
 
 
 def cover(results, test):
