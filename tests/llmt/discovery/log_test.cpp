@@ -110,8 +110,8 @@ TEST(FilteredRows, TheSimulationIsFilteredWhereThatIsRight) {
   EXPECT_TRUE(rounded.time.filtered);
 }
 
-// Among filtered rows the constant of a peak is tried at single rows first, where a Coulomb part beside it makes up for a
-// constant that is a little off: with everything fitted, nothing is left for that part.
+// Among filtered rows the constant of a peak is tried at single rows first, where a Coulomb part beside it makes up for
+// a constant that is a little off: with everything fitted, nothing is left for that part.
 TEST(FilteredRows, ATermThatContainsTheRightOneDoesNotTakeItsName) {
   const Model linear;
   for (const double c : {0.035, 0.05}) {
