@@ -179,6 +179,23 @@ TEST(Readable, NoProductStandsWithoutItsMainTerms) {
   EXPECT_GT(products, 0);
 }
 
+// Trees with quadratic local models come to the noise; without products a tree of linear ones does not.
+TEST(Readable, TheYardstickIsTheErrorOfTheBestCrispTreeOfTheFit) {
+  llmt::Random random(13);
+  Waves data{Eigen::MatrixXd(300, 2), Eigen::MatrixXd(300, 1)};
+  for (Eigen::Index i = 0; i < 300; ++i) {
+    data.inputs.row(i) << random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0);
+    data.outputs(i, 0) = 3.0 * data.inputs(i, 0) * data.inputs(i, 1) + 0.05 * random.normal();
+  }
+  llmt::FitOptions options = crisp_trees();
+  options.terms = llmt::LocalTerms::quadratic;
+  const llmt::PreparedFit prepared({data.inputs, data.outputs}, options);
+  const llmt::FitSummary fitted = llmt::fit(prepared).summary;
+  const double best = fitted.partitions[0].chosen.rmse;
+  EXPECT_LT(best, 0.06);
+  EXPECT_NEAR(llmt::fit_readable(prepared, fitted).partitions[0].yardstick, best, 1e-9);
+}
+
 TEST(Readable, KeepsTrendsInSlopesAndAtThresholds) {
   // Rises in the first input but for a dip that noise and a second regime invite; a category shifts all.
   llmt::Random random(15);

@@ -223,4 +223,19 @@ TEST(RoundedEquation, CoarseGrainsCostNoMoreThanTheNearestPlaneMay) {
   }
 }
 
+// Two columns at right angles, with slopes 0.03 and 1: the first, of a grain of 1, would be 0.
+TEST(RoundedEquation, ASlopeKeepsOneDigitWhereTheNextTermAsksForIt) {
+  const Eigen::Vector3d products(0.0, 3.0, 100.0);
+  const llmt::LocalSums sums{100.0 * Eigen::Matrix3d::Identity(), products, Eigen::VectorXd::Constant(1, 101.0)};
+  const llmt::SelectionPath path{.regressors = {0, 1}, .rss = {}};
+  const llmt::Origin origin{Eigen::Vector2d::Zero(), Eigen::VectorXd::Zero(1)};
+  const llmt::Grains grains{.intercept = {0}, .slopes = {{0, 0}}};
+  const auto first_slope = [&](const std::vector<llmt::Parents>& parents) {
+    return llmt::rounded_equation(sums, path, 2, origin, grains, parents).slope(0, 0);
+  };
+  EXPECT_EQ(first_slope({}), 0.0);
+  EXPECT_EQ(first_slope({{-1, -1}, {-1, -1}}), 0.0);
+  EXPECT_EQ(first_slope({{-1, -1}, {0, 0}}), 0.03);
+}
+
 }  // namespace

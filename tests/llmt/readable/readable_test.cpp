@@ -300,6 +300,7 @@ TEST(Readable, ServesSeveralOutputsEachOrTogether) {
   const llmt::ReadableResult shared = readable(data, options);
   ASSERT_EQ(shared.partitions.size(), 1u);
   EXPECT_EQ(shared.partitions[0].size, llmt::expression_size(shared.model));
+  EXPECT_EQ(shared.partitions[0].path[shared.partitions[0].taken].size, shared.partitions[0].size);
   EXPECT_TRUE(shared.partitions[0].is_within_loss);
 }
 
