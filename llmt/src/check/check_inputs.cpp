@@ -11,15 +11,10 @@ namespace {
 
 constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
 
-// Mean and standard deviation of the values in a record.
-struct Moments {
-  double mean = not_known;
-  double deviation = not_known;
-};
-
-Moments moments_of(const InputRecord& record) {
+// Standard deviation of the values in a record.
+double deviation_of(const InputRecord& record) {
   const auto rows = static_cast<double>(record.rows());
-  if (record.values.empty() || rows == 0.0) return {};
+  if (record.values.empty() || rows == 0.0) return not_known;
   double sum = 0.0;
   for (std::size_t k = 0; k < record.values.size(); ++k)
     sum += record.values[k] * static_cast<double>(record.counts[k]);
@@ -28,7 +23,7 @@ Moments moments_of(const InputRecord& record) {
     const double deviation = record.values[k] - sum / rows;
     squares += deviation * deviation * static_cast<double>(record.counts[k]);
   }
-  return {sum / rows, std::sqrt(squares / rows)};
+  return std::sqrt(squares / rows);
 }
 
 double share(Eigen::Index part, Eigen::Index all) {
@@ -58,7 +53,7 @@ CheckedInput check_numbers(const InputColumn& column, const Eigen::Ref<const Eig
   const Eigen::Index count = std::ssize(present);
   found.missing = values.size() - count;
   found.mean = count == 0 ? not_known : sum / static_cast<double>(count);
-  found.shift = (found.mean - found.training_mean) / moments_of(record).deviation;
+  found.shift = (found.mean - found.training_mean) / deviation_of(record);
   if (!std::isfinite(found.shift)) found.shift = not_known;
   if (record.empty()) {
     found.probability = not_known;
