@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "explain/game_rule.hpp"
 #include "llmt/boosted.hpp"
 #include "llmt/boosted_explain.hpp"
 #include "oracles/coalitions.hpp"
@@ -37,6 +38,27 @@ TEST(BoostedAttribution, IsTheShapleyValueOfEveryInput) {
     }
     EXPECT_GT(largest, 0.1) << "kind " << k << " would prove little";
   }
+}
+
+// Half the number of inputs that meet in a leaf, rounded up to an even number.
+TEST(BoostedAttribution, TheOrderOfIntegrationFollowsTheInputsThatMeet) {
+  std::vector<llmt::BoostedFeature> features;
+  for (int input = 0; input < 12; ++input) features.push_back({.first = input});
+  for (int input = 0; input < 12; input += 2) features.push_back({.first = input, .second = input + 1});
+  const auto order = [&](int split, const std::vector<int>& of_leaf) {
+    llmt::BoostedTree tree;
+    if (split >= 0) tree.splits = {{.feature = split, .left = -1, .right = -2}};
+    tree.leaves = {{.features = of_leaf, .slopes = std::vector<double>(of_leaf.size(), 1.0)}, {}};
+    return llmt::order_for(tree, features);
+  };
+  EXPECT_EQ(order(-1, {}), 2);
+  EXPECT_EQ(order(-1, {0, 1, 2, 3}), 2);
+  EXPECT_EQ(order(-1, {0, 1, 2, 3, 4}), 4);
+  EXPECT_EQ(order(-1, {0, 1, 2, 3, 12, 13}), 2);  // pairs of the same four
+  EXPECT_EQ(order(4, {0, 1, 2, 3}), 4);
+  EXPECT_EQ(order(3, {0, 1, 2, 3}), 2);
+  EXPECT_EQ(order(-1, {12, 13, 14, 15}), 4);
+  EXPECT_EQ(order(8, {12, 13, 14, 15}), 6);
 }
 
 TEST(BoostedAttribution, AddsUpToThePredictionOfAFittedSum) {

@@ -208,6 +208,14 @@ TEST(LineByHand, ACrispSplitJumpsWhereTheLineCrosses) {
   }
 }
 
+// A twentieth of the way that a goes elsewhere, and at 0.4 of it the split.
+TEST(LineByHand, AShortWayCrossesToo) {
+  const llmt::Model model =
+      model_of({split(0, 0.0, 1, 2), leaf(0.0, Eigen::Vector2d::Zero()), leaf(1.0, Eigen::Vector2d(0.0, 1.0))});
+  expect_shares(model, Eigen::Vector2d(-0.02, 0.0), Eigen::Vector2d(0.03, 1.0), Eigen::Vector2d(1.4, 0.6));
+  expect_shares(model, Eigen::Vector2d(0.03, 1.0), Eigen::Vector2d(-0.02, 0.0), Eigen::Vector2d(-1.4, -0.6));
+}
+
 // A threshold 1e-13 before the end counts as there, and all other inputs have reached the point.
 TEST(LineByHand, AThresholdNextToTheEndLeavesNothingBeyond) {
   const llmt::Model model =
@@ -226,6 +234,12 @@ TEST(LineByHand, AnObliqueSplitSharesItsJump) {
     expect_shares(jumps, from, from + way, Eigen::Vector3d(2.0, 1.0, 0.0));
     expect_shares(jumps, from + way, from, Eigen::Vector3d(-2.0, -1.0, 0.0));
   }
+  // All inputs are 0 at the threshold, so that no step of theirs is a part of what they are.
+  root.threshold = 0.0;
+  const llmt::Model at_zero = model_of({root, leaf(0.0, Eigen::Vector3d::Zero()), leaf(3.0, Eigen::Vector3d::Zero())});
+  expect_shares(at_zero, Eigen::Vector3d(-2.0, -1.0, 0.0), Eigen::Vector3d(2.0, 1.0, 0.0),
+                Eigen::Vector3d(2.0, 1.0, 0.0));
+  root.threshold = 0.2;
   // b is missing on the first half, and counts as 0. On the second half it is 0.1: a crosses at 0.1, where c is 0.55.
   const llmt::Model sloped =
       model_of({root, leaf(0.0, Eigen::Vector3d::Zero()), leaf(1.0, Eigen::Vector3d(0.0, 0.0, 1.0))});
