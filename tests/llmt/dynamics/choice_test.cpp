@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <limits>
@@ -53,6 +54,19 @@ TEST(DynamicChoice, AnOutputThatAddsUpHasItsPoleAtOne) {
   EXPECT_TRUE(llmt::fit_dynamic(systems::record(200, 23, systems::oscillator, 0.02), options)
                   .model.parts()
                   .lags.adds_up.empty());
+}
+
+// Cheap models say which lags are worth the others' time.
+TEST(DynamicChoice, OnlyTheFiveBestLagsMeetAllCandidates) {
+  llmt::DynamicOptions options;
+  options.rest = llmt::RestLearner::none;
+  const llmt::DynamicFit fit = llmt::fit_dynamic(systems::record(300, 24, systems::duffing, 0.05, 2.0), options);
+  std::vector<llmt::Lags> compared;
+  for (const llmt::DynamicCandidate& candidate : fit.summary.compared) {
+    if (std::ranges::find(compared, candidate.lags) == compared.end()) compared.push_back(candidate.lags);
+  }
+  EXPECT_GE(compared.size(), 2U);
+  EXPECT_LE(compared.size(), 5U);
 }
 
 // What never changes is no past to look at.

@@ -20,6 +20,7 @@
 #include "llmt/fit.hpp"
 #include "llmt/fit_dynamic.hpp"
 #include "llmt/simulator.hpp"
+#include "oracles/clamped.hpp"
 #include "oracles/compiled_c.hpp"
 
 namespace {
@@ -135,6 +136,7 @@ struct SensitivityCase {
   llmt::GrowthRule rule;
   bool has_stop;
   bool adds_up = false;
+  bool is_clamped = false;
 };
 
 TEST(Dynamics, SensitivitiesAreThoseOfDifferences) {
@@ -147,12 +149,14 @@ TEST(Dynamics, SensitivitiesAreThoseOfDifferences) {
       {"stops", 2, true, false, llmt::GrowthRule::rd, true},
       {"adds up", 1, false, true, llmt::GrowthRule::lolimot, false, true},
       {"adds up to a stop", 2, true, false, llmt::GrowthRule::rd, true, true},
+      {"clamped gates", 0, false, true, llmt::GrowthRule::hilomot, false, false, true},
   };
   const Series series = systems::record(150, 3, systems::duffing, 0.05, 2.0);
   for (const SensitivityCase& of : cases) {
     SCOPED_TRACE(of.name);
     DynamicParts parts = parts_for(series, {{{1, 2}}, {{1, 2}}, {of.adds_up}}, of.degree, of.is_held);
     if (of.has_tree) add_tree(parts, series, of.rule, 3);
+    if (of.is_clamped) parts.rest = oracle::clamped(std::get<llmt::Model>(parts.rest), Eigen::RowVector2d(-0.4, 0.6));
     if (of.has_stop) parts.outputs[0].upper_stop = 0.5 * parts.outputs[0].high;
     const std::vector<llmt::Window> windows = llmt::windows_of({{0, 80}, {90, 150}}, 2);
     const Eigen::VectorXd scale = Eigen::VectorXd::Constant(1, 2.0);
