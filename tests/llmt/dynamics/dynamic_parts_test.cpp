@@ -13,6 +13,7 @@
 #include "dynamics/windows.hpp"
 #include "llmt/dynamic_analysis.hpp"
 #include "llmt/dynamics/systems.hpp"
+#include "llmt/fit.hpp"
 #include "llmt/fit_dynamic.hpp"
 #include "llmt/lags.hpp"
 #include "llmt/static_curve.hpp"
@@ -195,6 +196,52 @@ TEST(DynamicParts, AllErrorsOfAShortStretchAreInOneList) {
   EXPECT_NEAR(runs.band.outputs[0][0].rows, 7.0 / 3.0, 1e-12);
   EXPECT_TRUE(runs.simulated.topRows(62).array().isNaN().all());
   EXPECT_TRUE(runs.simulated.bottomRows(5).allFinite());
+}
+
+// A tree for each of two outputs: derivatives by regressors and by parameters are those of differences.
+TEST(DynamicParts, EachTreeOfSeveralOutputsHasItsDerivatives) {
+  llmt::Random random(5);
+  Eigen::MatrixXd x(200, 3);
+  Eigen::MatrixXd y(200, 2);
+  for (Eigen::Index i = 0; i < 200; ++i) {
+    for (Eigen::Index j = 0; j < 3; ++j) x(i, j) = random.uniform(-1.0, 1.0);
+    y.row(i) << std::abs(x(i, 0)) + x(i, 2), x(i, 1) * x(i, 1) - x(i, 0);
+  }
+  llmt::DynamicParts parts;
+  parts.inputs = {{"u", "", -1.0, 1.0}};
+  parts.outputs = {{"p", "", -1.0, 2.0}, {"q", "", -1.0, 2.0}};
+  parts.lags = {{{1}, {1}}, {{1}}};
+  parts.polynomial = llmt::fit_polynomial(x, y, 0, 0.0);
+  llmt::FitOptions options;
+  options.validity = llmt::ValidityChoice::blend;
+  options.max_leaves = 4;
+  options.folds.count = 0;
+  parts.rest = llmt::fit(x, y, options).model;
+  ASSERT_EQ(std::get<llmt::Model>(parts.rest).partitions().size(), 2U);
+  const auto value = [](const llmt::DynamicParts& of, const Eigen::VectorXd& at) {
+    Eigen::VectorXd result(2);
+    llmt::OneStep(of).values(at.data(), result.data());
+    return result;
+  };
+  const Eigen::Vector3d at(0.05, 0.1, 0.3);
+  Eigen::VectorXd here(2);
+  Eigen::MatrixXd by_regressor;
+  Eigen::MatrixXd by_parameter;
+  llmt::OneStep(parts).derivatives(at.data(), here.data(), by_regressor, by_parameter);
+  constexpr double h = 1e-6;
+  for (int j = 0; j < 3; ++j) {
+    const Eigen::Vector3d step = h * Eigen::Vector3d::Unit(j);
+    const Eigen::VectorXd slope = (value(parts, at + step) - value(parts, at - step)) / (2.0 * h);
+    EXPECT_LT((by_regressor.col(j) - slope).norm(), 1e-6) << j;
+  }
+  const Eigen::VectorXd parameters = llmt::parameters_of(parts);
+  ASSERT_EQ(by_parameter.rows(), parameters.size());
+  for (Eigen::Index k = 0; k < parameters.size(); ++k) {
+    Eigen::VectorXd moved = parameters;
+    moved(k) += h;
+    const Eigen::VectorXd slope = (value(llmt::with_parameters(parts, moved), at) - here) / h;
+    EXPECT_LT((by_parameter.row(k).transpose() - slope).norm(), 1e-6) << k;
+  }
 }
 
 }  // namespace

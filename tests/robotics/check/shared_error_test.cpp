@@ -93,6 +93,22 @@ TEST(SharedError, TheLikeliestIsNearTheTrueOne) {
   EXPECT_GE(common, 17);
 }
 
+// Poses a few degrees apart, whose errors are alike only next to each other.
+TEST(SharedError, AShortRangeIsFound) {
+  Robot small = arm();
+  for (Joint& joint : small.chain.joints) joint.limits = std::array{-3.0, 3.0};
+  const SharedError truth{.share = 0.98, .range = 0.1, .sigma = 0.2};
+  int near = 0;
+  for (std::uint64_t draw = 1; draw <= 10; ++draw) {
+    const Measurements poses = measured(small, 40, draw);
+    const PointRows points = point_rows(small.chain, poses, all_rows(poses));
+    const Eigen::MatrixXd factor = correlations(truth, poses).llt().matrixL();
+    const Eigen::VectorXd shared = factor * (0.2 * drawn(120, 1, 300 + draw));
+    near += likeliest_shared_error(points, drawn(120, 4, 400 + draw), shared, 0.2).range == truth.range ? 1 : 0;
+  }
+  EXPECT_GE(near, 6);
+}
+
 // The noise has grown: nothing of it is in common.
 TEST(SharedError, NoiseThatGrewIsNotInCommon) {
   const Measurements poses = measured(arm(), 40, 3);
