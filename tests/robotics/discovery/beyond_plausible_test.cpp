@@ -20,6 +20,7 @@ TEST(BeyondPlausible, IsASizeAndNotAValueThatOthersCancel) {
   EXPECT_EQ(said[0].limit, 0.003);
   EXPECT_TRUE(said_of_half_width(0.002).empty());
   EXPECT_TRUE(said_of_half_width(0.8).empty());
+  EXPECT_TRUE(said_of_half_width(-0.001).empty());  // a limit of the sign
 }
 
 }  // namespace

@@ -109,6 +109,17 @@ TEST(DiscriminatingPoses, ProposedPosesTellMoreThanRandomOnes) {
   }
 }
 
+// More poses than are looked at in one go.
+TEST(DiscriminatingPoses, AllOfManyMeasuredPosesCount) {
+  Poses measured = simulate(rigid_planar(), {.poses = 1100, .seed = 3}).poses;
+  measured.covariates["payload_kg"] = Eigen::VectorXd::Constant(1100, 10.0);
+  const Discrimination telling = discriminating_poses(bent_outer_link(), 0, soft_elbow, measured, 1e-4, 2);
+  ASSERT_EQ(telling.poses.size(), 2U);
+  const double proposed = missed_mm(bent_outer_link(), soft_elbow, joined(measured, poses_of(telling)));
+  const double expected = std::hypot(telling.poses[0].disagreement_mm, telling.poses[1].disagreement_mm);
+  EXPECT_NEAR(proposed, expected, 0.02 * proposed);
+}
+
 TEST(DiscriminatingPoses, MeasuredPayloadsAreNotCalledNew) {
   Poses measured = measured_with_payload(10.0);
   measured.covariates["payload_kg"].head(20).setZero();
