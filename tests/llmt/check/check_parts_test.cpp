@@ -16,7 +16,7 @@ namespace {
 
 using llmt::CheckVerdict;
 
-constexpr double none = std::numeric_limits<double>::quiet_NaN();
+constexpr double absent = std::numeric_limits<double>::quiet_NaN();
 
 // The values 0.5, 1.5, ..., 99.5 of training, each once.
 llmt::InputRecord hundred_values() {
@@ -63,14 +63,14 @@ TEST(CheckedInputs, EmptyCellsAreMissingAndOnlyWhatTrainingHadNotIsUnknown) {
     return llmt::check_inputs({column}, {true}, given, at, {})[0];
   };
   const llmt::InputColumn column{.name = "k", .levels = {"a", "b"}};
-  const Eigen::VectorXd positions = (Eigen::VectorXd(7) << 0.0, 1.0, none, none, 0.5, 2.0, -1.0).finished();
+  const Eigen::VectorXd positions = (Eigen::VectorXd(7) << 0.0, 1.0, absent, absent, 0.5, 2.0, -1.0).finished();
   const llmt::CheckedInput named = checked(column, positions, positions);
   EXPECT_EQ(named.missing, 2);
   EXPECT_EQ(named.unknown, 3);
   llmt::InputColumn coded = column;
   coded.codes = {10.0, 20.0};
-  const Eigen::VectorXd given = (Eigen::VectorXd(4) << 10.0, 20.0, none, 15.0).finished();
-  const Eigen::VectorXd at = (Eigen::VectorXd(4) << 0.0, 1.0, none, 0.0).finished();
+  const Eigen::VectorXd given = (Eigen::VectorXd(4) << 10.0, 20.0, absent, 15.0).finished();
+  const Eigen::VectorXd at = (Eigen::VectorXd(4) << 0.0, 1.0, absent, 0.0).finished();
   const llmt::CheckedInput numbers = checked(coded, given, at);
   EXPECT_EQ(numbers.missing, 1);
   EXPECT_EQ(numbers.unknown, 1);
@@ -97,7 +97,7 @@ TEST(CheckedTargets, RowsOnEitherSideOfTheirIntervalsAreNotCovered) {
   EXPECT_EQ(llmt::check_target(target).covered, 0.75);
   target.observed(3) = 9.0;
   EXPECT_EQ(llmt::check_target(target).covered, 0.5);
-  target.observed.tail(3).setConstant(none);
+  target.observed.tail(3).setConstant(absent);
   EXPECT_EQ(llmt::check_target(target).covered, 0.0);
   llmt::JudgedTarget alone = judged(column, 1, 3.0);
   alone.lower = Eigen::VectorXd::Constant(1, 6.0);
