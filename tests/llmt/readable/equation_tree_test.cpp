@@ -30,7 +30,7 @@ llmt::TrainingRows all_rows(const llmt::Table& table) {
   return llmt::training_rows(table, rows);
 }
 
-llmt::Sample sampled(const llmt::Table& table) {
+llmt::Sample sample_of_table(const llmt::Table& table) {
   return llmt::make_sample(all_rows(table), nullptr, {0}, Eigen::VectorXd::Ones(1));
 }
 
@@ -53,7 +53,7 @@ SampledRows product_of_the_first_two(Eigen::Index inputs) {
 TEST(EquationTree, HasProductsOnlyInTheFormsOfFewInputsWithoutTrends) {
   const auto has_products = [](const SampledRows& rows, const llmt::Form& form) {
     const llmt::Table table = rows.table();
-    const llmt::Sample sample = sampled(table);
+    const llmt::Sample sample = sample_of_table(table);
     llmt::EquationTree tree = tree_of_all_inputs(sample, form);
     return !tree.products_in(tree.pruned(0.0)).empty();
   };
@@ -80,7 +80,7 @@ TEST(EquationTree, ALeafHasFiveRowsAndARowForEachCoefficientOfTheSearch) {
       rows.outputs(i, 0) = (i < 4 ? -50.0 : i > 82 ? 50.0 : 0.0) + random.normal();
     }
     const llmt::Table table = rows.table();
-    const llmt::Sample sample = sampled(table);
+    const llmt::Sample sample = sample_of_table(table);
     llmt::EquationTree tree = tree_of_all_inputs(sample, {.products = false, .coarseness = 0.1});
     const llmt::Partition partition = tree.partition(tree.pruned(0.0), {});
     EXPECT_GT(partition.num_leaves(), 1);
@@ -94,7 +94,7 @@ TEST(EquationTree, TheSchwarzPriceOfDataWithoutNoiseIsTheLastAtWhichSomethingWas
   rows.inputs << Eigen::VectorXd::Constant(8, -1.0), Eigen::VectorXd::Ones(8);
   rows.outputs = 2.0 * rows.inputs;
   const llmt::Table table = rows.table();
-  const llmt::Sample sample = sampled(table);
+  const llmt::Sample sample = sample_of_table(table);
   llmt::EquationTree tree = tree_of_all_inputs(sample, {.products = false, .coarseness = 1.0, .splits = false});
   EXPECT_EQ(tree.variance(), 4.0);
   EXPECT_NEAR(tree.schwarz_price(), 4.0 * std::log(16.0) / 16.0 / 4.0, 1e-12);
@@ -115,7 +115,7 @@ TEST(EquationTree, ATermOfTheWrongSignIsLeftOutAndOnlyThat) {
   const llmt::Form form = {.products = false, .coarseness = 1.0, .splits = false};
   const auto importance = [&] {
     const llmt::Table table = rows.table();
-    const llmt::Sample sample = sampled(table);
+    const llmt::Sample sample = sample_of_table(table);
     llmt::EquationTree tree = tree_of_all_inputs(sample, form);
     return tree.importance(tree.pruned(0.0));
   };
@@ -136,7 +136,7 @@ TEST(EquationTree, ASplitThatSendsNoRowOneWayIsNone) {
     rows.outputs(i, 0) = rows.inputs(i, 0) < 0.5 ? 0.0 : 9.0;
   }
   const llmt::Table table = rows.table();
-  const llmt::Sample sample = sampled(table);
+  const llmt::Sample sample = sample_of_table(table);
   const auto rules = [&](const std::vector<int>& sides) {
     std::vector<llmt::Node> grown(5);
     grown[0].left = 1;
@@ -161,7 +161,7 @@ TEST(EquationTree, LevelsAreCentredAtTheirShares) {
   rows.inputs << 1, 1, 1, 1, 1, 0, 0, 0, 2, 2;
   rows.outputs.setOnes();
   const llmt::Table table = rows.table();
-  const llmt::Sample sample = sampled(table);
+  const llmt::Sample sample = sample_of_table(table);
   ASSERT_EQ(sample.described.regressors.size(), 2U);
   EXPECT_EQ(sample.described.regressors[0].level, 0);
   EXPECT_NEAR(sample.described.regressors[0].centre, 0.3, 1e-15);
