@@ -212,15 +212,6 @@ FoundTerms found_terms(const std::string& json, const std::string& file) {
   return found_terms(parsed, file);
 }
 
-namespace {
-
-bool has_tentative(const Json& json) {
-  const Json& effects = json.at("effects");
-  return std::ranges::any_of(effects, [](const Json& effect) { return !effect.value("confirmed", true); });
-}
-
-}  // namespace
-
 FoundTerms found_terms(const Json& json, const std::string& file) {
   FoundTerms found;
   found.file = file;
@@ -244,8 +235,7 @@ FoundTerms found_terms(const Json& json, const std::string& file) {
     if (json.value("may_be_applied", true)) {
       for (const Json& parameter : json.at("parameters")) read_parameter(parameter, found);
       read_terms(json, found);
-      found.is_held =
-          json.value("verdict", "") == discovery::to_string(discovery::Answer::unknown) || has_tentative(json);
+      found.is_held = json.value("verdict", "") == discovery::to_string(discovery::Answer::unknown);
     } else {
       found.refused = json.at("verdict").get<std::string>();
     }

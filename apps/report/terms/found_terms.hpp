@@ -54,8 +54,8 @@ struct FoundTerms {
   /// The verdict of a search that has found nothing to be added, discovery::may_be_applied(); then there are no terms
   /// and no changes. Empty: there is something.
   std::string refused;
-  /// The verdict is that an effect is unknown, or a term is not confirmed: the terms are fitted functions of what was
-  /// seen, no laws. Beyond the rows that were searched their inputs count as low or high.
+  /// The verdict is that an effect is unknown: the terms are fitted functions of what was seen, no laws. Beyond the
+  /// rows that were searched their inputs count as low or high.
   bool is_held = false;
 
   std::vector<std::string> input_names() const;
