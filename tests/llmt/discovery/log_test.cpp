@@ -104,6 +104,9 @@ TEST(FilteredRows, TheSimulationIsFilteredWhereThatIsRight) {
   const Missing missing = missing_from(rows_of_log(1, linear, 0.05, at_once, {.cutoff = 6.0}, shaken));
   EXPECT_EQ(missing.answer, Answer::nothing_missing) << to_string(missing.answer);
   EXPECT_FALSE(missing.time.filtered);
+  EXPECT_TRUE(std::ranges::any_of(missing.notes, [](const std::string& note) {
+    return note.starts_with("the simulation was taken as it stands");
+  }));
   EXPECT_LT(missing.gaps[0].after, 2.0 * missing.gaps[0].known_noise);
   const Model dry{.dry = 2.0};
   const Missing rounded = missing_from(rows_of_log(1, dry, 0.05, [&](double t) { return dry.torque(motion(t)); }));

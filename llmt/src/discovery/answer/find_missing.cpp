@@ -201,6 +201,11 @@ Missing find(const Simulation& simulation, const Recording& as_given, const Meas
   std::ranges::move(beginning.at_reversals, std::back_inserter(apart));
   std::vector<std::string> notes = smooth.notes;
   tell(apart, notes);
+  if (recording.is_filtered() && !recording.goes_through_filter()) {
+    notes.push_back(
+        "the simulation was taken as it stands: filtered as the measured outputs were, it would leave more than twice "
+        "as much, because the motion is as fast as the cutoff");
+  }
   missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
   return missing;
 }
