@@ -19,8 +19,7 @@ constexpr double most_looked_at = 16.0;
 constexpr const char* of_pairs = " with pairs";
 constexpr double free_margin = 0.25;  // of 1 / sqrt(held-out rows): by how much a variant must be better
 constexpr double soft_margin = 1.0;
-constexpr double soft_price = 0.026;  // of the error, for six times the operations: a hundredth for each doubling
-constexpr double proof = 3.0;         // by so many standard errors of the mean difference of squares
+constexpr double proof = 3.0;  // by so many standard errors of the mean difference of squares
 
 // So many of the rows, evenly spread over them.
 std::vector<int> some_of(const std::vector<int>& rows, Eigen::Index most) {
@@ -191,10 +190,7 @@ SumPlan race(const BoostingData& data, const Eigen::VectorXd& output, const Roun
   if (SumPlan paired = with_pairs_of(most_paired, best); paired.rows.features.size() > features) {
     take_if(std::move(paired), is_better_by(0.0));
   }
-  take_if(softened(best, usual), [=](const Raced& one, const Raced& than) {
-    const double noise = soft_margin / std::sqrt(static_cast<double>(one.residuals.size()));
-    return are_few ? is_proven(one, than) : one.rmse < than.rmse * (1.0 - std::max(noise, soft_price));
-  });
+  take_if(softened(best, usual), is_better_by(soft_margin));
   if (best.rounds.tree.softness > 0.0) {
     SumPlan paired = with_pairs_of(most_soft_paired, best);
     if (paired.rows.features.size() > best.rows.features.size()) {
