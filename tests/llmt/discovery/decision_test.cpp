@@ -62,36 +62,6 @@ void add_fact(const std::string& what, Missing& missing) {
   if (what.starts_with("parameters")) missing.parameters_explain = true;
 }
 
-// Rows that were set apart cannot show that a term is right, but that it is not: at rest, dry friction is anything up
-// to that of motion, so a right term makes the error there at most twice as large as what it explains elsewhere.
-TEST(Decision, TermsThatAreFarOffOnRowsSetApartAreNotApplied) {
-  constexpr Eigen::Index n = 10;
-  std::vector<bool> apart(n, false);
-  for (std::size_t i = 6; i < n; ++i) apart[i] = true;
-  const auto judged = [&](double at_rest) {
-    Missing missing;
-    missing.found = {term()};
-    missing.found[0].output = "u";
-    missing.found[0].shrinks_gap = true;
-    missing.gaps = {Gap{.output = "u", .before = 1.0, .after = 0.1, .noise_floor = 0.1, .nominal = 1.0}};
-    missing.before = Eigen::MatrixXd::Zero(n, 1);
-    missing.corrected = Eigen::VectorXd::Ones(n);
-    missing.corrected.bottomRows(4).setConstant(at_rest);
-    judge_rows_apart({{"u"}, Eigen::VectorXd::Constant(n, 0.2)}, apart, missing);
-    decide(missing);
-    return missing;
-  };
-  const Missing held = judged(2.2);
-  EXPECT_EQ(held.answer, Answer::named);
-  EXPECT_TRUE(may_be_applied(held));
-  const Missing refused = judged(3.5);
-  EXPECT_EQ(refused.answer, Answer::unknown);
-  EXPECT_FALSE(refused.found[0].confirmed);
-  EXPECT_FALSE(may_be_applied(refused));
-  ASSERT_EQ(refused.notes.size(), 1u);
-  EXPECT_NE(refused.notes[0].find("4 rows"), std::string::npos);
-}
-
 // Effects in parts approximate any function, as the leaves of a tree do; one of them is a name.
 TEST(Decision, SeveralEffectsInPartsMayStandForAnother) {
   Missing missing;

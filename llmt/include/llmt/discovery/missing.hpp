@@ -161,7 +161,6 @@ enum class Reason {
   errors_of_inputs,  ///< errors of the inputs are more than half of it
   rival,             ///< another term is as likely, and is another function
   likelier,          ///< another answer is likelier, but not certain either
-  larger_apart,      ///< with the terms the rows set apart are far more in error than without
 };
 
 /// As a clause, "it is a shape, not a cause".
@@ -218,7 +217,7 @@ bool is_drift(const Missing& missing);
 
 /// Whether what was found is not to be added: it failed on the rows set aside, or the sum of Gap::after^2 / before^2
 /// over the outputs is larger than their number, as where a term makes errors of the inputs larger than what it
-/// explains; or there is the objection Reason::larger_apart.
+/// explains.
 bool is_worse(const Missing& missing);
 
 /// Whether what was found may be added to a simulation of other rows: the answer is a term, a state or parameters that

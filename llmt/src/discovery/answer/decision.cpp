@@ -173,36 +173,6 @@ void judge_noise(Missing& missing) {
   }
 }
 
-void judge_rows_apart(const MeasuredOutputs& measured, const std::vector<bool>& apart, Missing& missing) {
-  constexpr double far = 3.0;  // at rest friction is anything up to that of motion: the error is at most twice that
-  const auto count = static_cast<double>(std::ranges::count(apart, true));
-  if (count == 0.0 || missing.found.empty()) return;
-  for (std::size_t o = 0; o < missing.gaps.size(); ++o) {
-    const Gap& gap = missing.gaps[o];
-    double before = 0.0;
-    double after = 0.0;
-    std::vector<std::size_t> terms;
-    for (std::size_t k = 0; k < missing.found.size(); ++k) {
-      if (missing.found[k].output == gap.output) terms.push_back(k);
-    }
-    const auto column = static_cast<Eigen::Index>(o);
-    for (std::size_t i = 0; i < apart.size(); ++i) {
-      if (!apart[i]) continue;
-      const auto row = static_cast<Eigen::Index>(i);
-      before += std::pow(measured.values(row, column) - missing.before(row, column), 2.0);
-      after += std::pow(measured.values(row, column) - missing.corrected(row, column), 2.0);
-    }
-    before = std::sqrt(before / count);
-    after = std::sqrt(after / count);
-    if (terms.empty() || !(after > far * std::max(before, gap.before))) continue;
-    object(missing, Reason::larger_apart, terms);
-    missing.notes.push_back(
-        fmt::format("on the {:.0f} rows that were set apart the terms take the error of {} from {:.3g} to {:.3g}: "
-                    "they do not hold there, and nothing is to be applied",
-                    count, gap.output, before, after));
-  }
-}
-
 void decide(Missing& missing) {
   std::set<Eigen::Index> doubtful;
   bool is_refused = missing.verdict.answer == Answer::unknown;
@@ -242,8 +212,6 @@ std::string to_string(Reason reason) {
       return "another function explains these rows as well";
     case Reason::likelier:
       return "other terms, which are not certain either, explain these rows better";
-    case Reason::larger_apart:
-      return "it makes the error far larger on rows that were set apart";
   }
   return "";
 }
@@ -256,7 +224,6 @@ bool is_drift(const Missing& missing) {
 }
 
 bool is_worse(const Missing& missing) {
-  if (is_raised(missing, Reason::larger_apart)) return true;
   // Without terms there is nothing to leave out; rounding and corrected parameters may differ from the fit before.
   if (missing.found.empty() && missing.answer != Answer::failed_held_out) return false;
   double left = 0.0;

@@ -196,8 +196,6 @@ Missing find(const Simulation& simulation, const Recording& as_given, const Meas
     missing.corrected = as_given.as_measured(with_found_terms(simulation, missing, terms, as_given));
     missing.change_by_smoothing = smooth.change;
   }
-  judge_rows_apart(measured, searched.apart, missing);
-  if (is_worse(missing)) decide(missing);
   std::ranges::move(beginning.at_reversals, std::back_inserter(apart));
   std::vector<std::string> notes = smooth.notes;
   tell(apart, notes);

@@ -30,11 +30,6 @@ void judge_findings(Missing& missing, bool in_time);
 /// Where more is left of an output than 5 times its known noise: against its terms that are no state.
 void judge_noise(Missing& missing);
 
-/// Against the terms of an output with which the rows that were set apart are more than three times as far off, in root
-/// mean square, as without them there or on the rows set aside. Such rows cannot show that a term is right, but that it
-/// was seen only at the end of what it does: a peak at small speeds, at rows that move fast. `apart`: of all rows.
-void judge_rows_apart(const MeasuredOutputs& measured, const std::vector<bool>& apart, Missing& missing);
-
 /// Sets Missing::answer and FoundTerm::confirmed. The terms of an output are confirmed if there is no objection to the
 /// answer, nor to any of them: beside one that is tentative another may stand for a part of it. The answer is that of
 /// the first row of the table in docs/algorithms/rows-in-time.md ("The answer") that applies.
