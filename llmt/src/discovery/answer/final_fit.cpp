@@ -211,8 +211,8 @@ void take_simpler(const TermModel& model, const TermData& data, TermFit& fit, Mi
     simpler.shrinks_gap = found.shrinks_gap;
     simpler.rivals = std::move(found.rivals);
     simpler.confirmed = found.confirmed;
-    std::erase_if(simpler.rivals, [&](const RivalTerms& rival) {
-      return rival.what.starts_with(name_of(model.terms()[simpler.term]));
+    std::erase_if(simpler.rivals, [name = name_of(model.terms()[simpler.term])](const RivalTerms& rival) {
+      return rival.what == name || rival.what.starts_with(name + " (");  // with its constant
     });
     found = std::move(simpler);
   }
