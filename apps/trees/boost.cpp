@@ -1,8 +1,11 @@
 #include <fmt/format.h>
 
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "llmt/boosted.hpp"
+#include "llmt/time_limit.hpp"
 #include "report/fit/boosted_summary.hpp"
 #include "report/fit/mean_of_rows.hpp"
 #include "shared/cli.hpp"
@@ -18,13 +21,21 @@ void boost_command(const CLI::App& command, const BoostArguments& arguments) {
         fmt::format("{}: {} row{}; --boost needs at least {} that differ, llmt fit without --boost takes fewer",
                     table_name(arguments.learning.data), rows, rows == 1 ? "" : "s", fewest_boosted_rows));
   }
-  const BoostOptions options{
-      .seed = table.options.folds.seed, .seeds = arguments.seeds, .max_threads = table.options.max_threads};
+  const BoostOptions options{.max_rounds = arguments.max_rounds,
+                             .seed = table.options.folds.seed,
+                             .seeds = arguments.seeds,
+                             .max_threads = table.options.max_threads};
   ProgressBar bar("boosting");
-  const BoostResult result = fit_boosted(*table.data, options, bar.callback());
+  std::optional<TimeLimit> time;
+  const BoostResult result = [&] {
+    if (arguments.time_limit == 0.0) return fit_boosted(*table.data, options, bar.callback());
+    TimedSum timed = fit_boosted_within(arguments.time_limit, *table.data, options, bar.callback());
+    time = timed.time;
+    return std::move(timed.result);
+  }();
   bar.clear();
   if (!arguments.output.empty()) save(result.model, arguments.output);
-  report::BoostedRun run{table_name(arguments.learning.data), arguments.output};
+  report::BoostedRun run{table_name(arguments.learning.data), arguments.output, {}, time};
   for (const auto& output : table.data->outputs.colwise()) {
     run.rmse_of_mean.push_back(report::error_of_mean(output, table.data->weights, {}).train);
   }

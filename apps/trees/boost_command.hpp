@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "llmt/boosted.hpp"
 #include "trees/learning.hpp"
 
 namespace llmt::apps {
@@ -14,6 +15,8 @@ struct BoostArguments {
   std::string output;
   bool json = false;
   int seeds = 1;
+  int max_rounds = BoostOptions().max_rounds;
+  double time_limit = 0.0;  ///< in seconds; 0: none
 };
 
 /// Fits a sum of trees. `command`: to refuse options of `llmt fit` that are for one tree.

@@ -12,12 +12,14 @@
 #include "llmt/fit.hpp"
 #include "llmt/readable.hpp"
 #include "llmt/teach.hpp"
+#include "llmt/time_limit.hpp"
 #include "report/document/document_text.hpp"
 #include "report/fit/fit_summary.hpp"
 #include "report/fit/neighbours.hpp"
 #include "report/fit/of_fit.hpp"
 #include "report/fit/readable_summary.hpp"
 #include "report/fit/teaching_summary.hpp"
+#include "report/fit/time_limit.hpp"
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
 #include "shared/options.hpp"
@@ -42,6 +44,8 @@ struct FitArguments {
   bool stream = false;
   bool boost = false;
   int seeds = 1;
+  int max_rounds = BoostOptions().max_rounds;
+  double time_limit = 0.0;  ///< in seconds; 0: none
   bool teach = false;
   ArrowFitArguments arrow;
   DynamicArguments dynamic;
@@ -63,10 +67,17 @@ struct Fitting {
   PreparedFit prepared;
   FitResult result;
   std::optional<TaughtResult> taught = {};
+  std::optional<TimeLimit> time = {};
 };
 
-Fitting fit_with_bar(const FitArguments& arguments, const LearningTable& table) {
+// `table`: gets the options of the fit that the time was enough for.
+Fitting fit_with_bar(const FitArguments& arguments, LearningTable& table) {
   ProgressBar bar("fitting");
+  if (arguments.time_limit > 0.0) {
+    TimedTree timed = fit_within(arguments.time_limit, table.data, table.options, bar.callback());
+    table.options = std::move(timed.options);
+    return {timed.prepared, std::move(timed.fit), {}, timed.time};
+  }
   Work work(bar.callback());
   Work preparing(work, table.options.loss == Loss::tukey ? 0.2 : 0.05);
   const PreparedFit prepared(table.data, table.options, preparing.progress());
@@ -129,17 +140,20 @@ std::string write_fit_reports(const FitArguments& arguments, const LearningTable
 }
 
 // What blocks of consecutive rows as folds would say, where rows that follow each other are alike; else nothing.
-std::optional<std::string> words_of_neighbours(const LearningTable& table, const FitResult& result) {
+std::optional<std::string> words_of_neighbours(const LearningTable& table, const Fitting& fitting) {
+  const FitResult& result = fitting.result;
   const double correlation = report::neighbours_correlation(*table.data, table.options, result);
   if (!report::are_alike(correlation, table.data->inputs.rows())) return std::nullopt;
   FitOptions contiguous = table.options;
   contiguous.folds.kind = FoldKind::contiguous;
   contiguous.intervals = false;
+  const double own = result.summary.partitions.front().chosen.rmse;
+  // This fit takes about as long again, which a time limit does not have.
+  if (fitting.time) return report::neighbours_text(correlation, own, std::nullopt);
   ProgressBar bar("blocks of rows");
   const FitResult other = fit(*table.data, contiguous, bar.callback());
   bar.clear();
-  return report::neighbours_text(correlation, result.summary.partitions.front().chosen.rmse,
-                                 other.summary.partitions.front().chosen.rmse);
+  return report::neighbours_text(correlation, own, other.summary.partitions.front().chosen.rmse);
 }
 
 void fit_command(FitArguments arguments) {
@@ -164,13 +178,14 @@ void fit_command(FitArguments arguments) {
   }
   std::optional<ReadableResult> readable;
   if (!arguments.readable.empty()) readable = make_readable(arguments, fitting, asked);
-  const std::optional<std::string> neighbours = words_of_neighbours(table, result);
+  const std::optional<std::string> neighbours = words_of_neighbours(table, fitting);
   const auto run_of = [&](const std::string& data, const std::string& output) {
     return report::FitRun{data, table.options, *table.data, table.lines, output};
   };
   const auto words_for = [&](const std::string& output) {
     report::Document words = report::fit_words(run_of(table_name(arguments.learning.data), output), result);
     if (neighbours) words.notes.push_back(*neighbours);
+    if (fitting.time) words.notes.push_back(report::time_limit_text(*fitting.time, report::LimitedSize::leaves));
     if (fitting.taught) words.sections.push_back(report::teaching_words(*fitting.taught));
     if (readable) words.sections.push_back(report::readable_words(result, *readable, asked));
     return words;
@@ -180,6 +195,7 @@ void fit_command(FitArguments arguments) {
   if (arguments.json) {
     const report::FitRun run = run_of(arguments.learning.data, arguments.output);
     Json summary = report::fit_json(run, result);
+    if (fitting.time) summary["time_limit"] = report::time_limit_json(*fitting.time, report::LimitedSize::leaves);
     if (fitting.taught) summary["teaching"] = report::teaching_json(*fitting.taught);
     if (readable) summary["readable"] = report::readable_json(result, *readable, asked);
     print_json(summary);
@@ -219,6 +235,11 @@ void add_fit(CLI::App& app) {
   command->add_flag("--teach", arguments->teach,
                     "Fit the tree to the answers of a sum of trees (--boost), on the rows and on rows made of them; "
                     "taken if its held-out error is smaller. Takes several times as long");
+  add_number(
+      *command, "--time-limit", arguments->time_limit, above_zero,
+      "Seconds that the fit may take: the largest tree, or the sum of the most trees (--boost), that ends by then. "
+      "The result names the size, and --max-leaves or --max-rounds makes the same model again. A readable tree "
+      "and reports take their own time");
   add_report_options(*command, arguments->reports,
                      "predicted against observed (and FILE.importance.svg: what matters), with --lags runs over time");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
@@ -230,6 +251,8 @@ void add_fit(CLI::App& app) {
             "With --boost: the mean of this many sums, whose splits look at other features each. Two are about "
             "2 % more accurate in the mean of many tables; takes as many times as long",
             most_seeds);
+  add_count(*command, "--max-rounds", arguments->max_rounds, 1,
+            "With --boost: most trees of a target, before the sum is fitted to all rows with a quarter more [2000]");
   add_dynamic_options(*command, arguments->dynamic);
   add_arrow_fit_options(*command, arguments->arrow);
   require_forms(*command);
@@ -261,10 +284,16 @@ void add_fit(CLI::App& app) {
       return;
     }
     if (arguments->boost) {
-      boost_command(*command, {arguments->learning, arguments->output, arguments->json, arguments->seeds});
+      boost_command(*command, {arguments->learning, arguments->output, arguments->json, arguments->seeds,
+                               arguments->max_rounds, arguments->time_limit});
       return;
     }
-    if (command->count("--seeds") > 0) throw std::invalid_argument("--seeds is for --boost");
+    for (const char* option : {"--seeds", "--max-rounds"}) {
+      if (command->count(option) > 0) throw std::invalid_argument(fmt::format("{} is for --boost", option));
+    }
+    if (arguments->teach && arguments->time_limit > 0.0) {
+      throw std::invalid_argument("--time-limit does not go with --teach, which fits a sum and a tree in every fold");
+    }
     fit_command(*arguments);
   });
 }

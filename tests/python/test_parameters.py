@@ -26,11 +26,20 @@ TREE = {
     "readable": True,
     "readable_rules": 2,
     "teach": True,
+    "time_limit": 1e-9,
     "random_state": 7,
     "n_jobs": 2,
 }
 FEW_FOLDS = {"cv": 3}  # of the trees, where the number of folds is not what is changed: fits take half of the time
-SUM = {"learning_rate": 0.3, "max_iter": 4, "seeds": 2, "categorical_features": ["d"], "random_state": 7, "n_jobs": 2}
+SUM = {
+    "learning_rate": 0.3,
+    "max_iter": 4,
+    "seeds": 2,
+    "time_limit": 1e-9,
+    "categorical_features": ["d"],
+    "random_state": 7,
+    "n_jobs": 2,
+}
 WITHOUT_EFFECT = {"n_jobs"}  # the result does not depend on the number of threads
 
 
@@ -103,7 +112,7 @@ def test_beyond_one_memory_a_parameter_means_what_it_means_in_fit(name):
         state = distributed.start(list(X.columns), "y", block_rows=120, estimator=estimator)
     except ValueError as refused:
         assert name in str(refused) and "beyond one memory" in str(refused)
-        assert name in {"rule", "local_models", "loss", "categorical_features", "monotonic_cst", "readable", "readable_rules", "teach"}
+        assert name in {"rule", "local_models", "loss", "categorical_features", "monotonic_cst", "readable", "readable_rules", "teach", "time_limit"}
         return
     while distributed.status(state)["step"] != "finished":
         state = distributed.advance(state, distributed.sums(state, X, y))

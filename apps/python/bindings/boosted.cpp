@@ -18,6 +18,7 @@
 #include "llmt/boosted.hpp"
 #include "llmt/boosted_explain.hpp"
 #include "llmt/c_source.hpp"
+#include "llmt/time_limit.hpp"
 #include "python/bindings/checked.hpp"
 #include "python/bindings/interruptible.hpp"
 #include "python/bindings/model_arrays.hpp"
@@ -30,22 +31,36 @@
 namespace llmt::python {
 namespace {
 
-std::unique_ptr<BoostResult> boost_table(const Array& inputs, const Array& outputs, const Options& options,
-                                         std::vector<std::string> input_names, std::vector<std::string> output_names,
-                                         std::vector<std::vector<std::string>> levels,
-                                         const std::optional<Vector>& weights, const std::optional<Vector>& groups,
-                                         std::vector<Eigen::Index> held_out, const nb::object& report) {
+// A sum and, where a time limit was given, what it did.
+struct BoostedFit {
+  BoostResult result;
+  std::optional<TimeLimit> time;
+};
+
+std::unique_ptr<BoostedFit> boost_table(const Array& inputs, const Array& outputs, const Options& options,
+                                        std::vector<std::string> input_names, std::vector<std::string> output_names,
+                                        std::vector<std::vector<std::string>> levels,
+                                        const std::optional<Vector>& weights, const std::optional<Vector>& groups,
+                                        std::vector<Eigen::Index> held_out, double time_limit,
+                                        const nb::object& report) {
   TrainingData data = training_data_of(inputs, outputs, weights, groups);
   data.held_out = std::move(held_out);
   data.levels = std::move(levels);
   data.input_names = std::move(input_names);
   data.output_names = std::move(output_names);
   const BoostOptions boost = boost_options_of(options);
-  std::unique_ptr<BoostResult> result;
+  std::unique_ptr<BoostedFit> fitted;
   interruptible(
-      [&](const Progress& progress) { result = std::make_unique<BoostResult>(fit_boosted(data, boost, progress)); },
+      [&](const Progress& progress) {
+        if (time_limit == 0.0) {
+          fitted = std::make_unique<BoostedFit>(fit_boosted(data, boost, progress), std::nullopt);
+          return;
+        }
+        TimedSum timed = fit_boosted_within(time_limit, data, boost, progress);
+        fitted = std::make_unique<BoostedFit>(std::move(timed.result), timed.time);
+      },
       report);
-  return result;
+  return fitted;
 }
 
 auto predict_by_sum(const BoostedModel& self, const Array& inputs, int threads) {
@@ -165,19 +180,19 @@ void add_boosted(nb::module_& module) {
       .def("text", [](const Self& self, const std::string& name, std::size_t width) {
         return report::boosted_inspection_text(self, name, width);
       });
-  nb::class_<BoostResult>(module, "BoostFit", "A boosted fit with all that reports need of it.")
-      .def("model", [](const BoostResult& self) { return self.model; })
+  nb::class_<BoostedFit>(module, "BoostFit", "A boosted fit with all that reports need of it.")
+      .def("model", [](const BoostedFit& self) { return self.result.model; })
       .def("summary",
-           [](const BoostResult& self, const std::string& data) {
-             return report::boosted_json({.data = data, .output = ""}, self).dump();
+           [](const BoostedFit& self, const std::string& data) {
+             return report::boosted_json({.data = data, .output = "", .time = self.time}, self.result).dump();
            })
-      .def("text", [](const BoostResult& self, const std::string& data, std::size_t width) {
-        return report::boosted_text({.data = data, .output = ""}, self, width);
+      .def("text", [](const BoostedFit& self, const std::string& data, std::size_t width) {
+        return report::boosted_text({.data = data, .output = "", .time = self.time}, self.result, width);
       });
   module.def("boost", &boost_table, nb::arg("inputs"), nb::arg("outputs"), nb::arg("options"), nb::kw_only(),
              nb::arg("input_names"), nb::arg("output_names"), nb::arg("levels"), nb::arg("weights") = nb::none(),
              nb::arg("groups") = nb::none(), nb::arg("held_out") = std::vector<Eigen::Index>(),
-             nb::arg("report") = nb::none());
+             nb::arg("time_limit") = 0.0, nb::arg("report") = nb::none());
 }
 
 }  // namespace llmt::python

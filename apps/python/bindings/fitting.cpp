@@ -17,6 +17,7 @@
 #include "llmt/readable.hpp"
 #include "llmt/stream.hpp"
 #include "llmt/teach.hpp"
+#include "llmt/time_limit.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/interruptible.hpp"
 #include "python/bindings/module.hpp"
@@ -30,6 +31,7 @@
 #include "report/fit/of_fit.hpp"
 #include "report/fit/readable_summary.hpp"
 #include "report/fit/teaching_summary.hpp"
+#include "report/fit/time_limit.hpp"
 #include "report/table/named_inputs.hpp"
 
 namespace llmt::python {
@@ -42,7 +44,7 @@ constexpr double readable_share = 0.4;
 class Fit {
  public:
   Fit(TrainingData data, const FitOptions& options, std::optional<double> readable_loss, Eigen::Index readable_rules,
-      bool teach, const nb::object& report)
+      bool teach, double time_limit, const nb::object& report)
       : options_(options), asked_{readable_loss.value_or(ReadableOptions().loss), readable_rules} {
     if (const std::string why = teach ? why_not_taught(options) : ""; !why.empty()) {
       throw std::invalid_argument("teaching does not go with " + why);
@@ -50,22 +52,15 @@ class Fit {
     if (const std::string why = readable_loss ? why_not_readable(options) : ""; !why.empty()) {
       throw std::invalid_argument("a readable tree does not go with " + why);
     }
+    if (teach && time_limit > 0.0) throw std::invalid_argument("teaching does not go with a time limit");
     lines_.resize(data.inputs.rows());
     std::iota(lines_.begin(), lines_.end(), Eigen::Index{0});
     const auto shared = std::make_shared<const TrainingData>(std::move(data));
     interruptible(
         [&](const Progress& progress) {
           Work work(progress);
-          Work preparing(work, preparing_share);
-          prepared_.emplace(shared, options_, preparing.progress());
           Work fitting(work, work.left() - (readable_loss ? readable_share : 0.0));
-          if (teach) {
-            taught_ = fit_taught(*prepared_, {.seed = options_.folds.seed}, fitting.progress());
-            prepared_ = taught_->prepared;
-            result_ = taught_->fit;
-          } else {
-            result_.emplace(fit(*prepared_, fitting.progress()));
-          }
+          fit_model(shared, teach, time_limit, fitting);
           if (!readable_loss) return;
           Work reading(work, work.left());
           readable_ = fit_readable(*prepared_, result_->summary, asked_, reading.progress());
@@ -80,6 +75,7 @@ class Fit {
 
   std::string summary(const std::string& data) const {
     report::Json summary = report::fit_json(run(data), *result_);
+    if (time_) summary["time_limit"] = report::time_limit_json(*time_, report::LimitedSize::leaves);
     if (taught_) summary["teaching"] = report::teaching_json(*taught_);
     if (readable_) summary["readable"] = report::readable_json(*result_, *readable_, asked_);
     return summary.dump();
@@ -127,10 +123,32 @@ class Fit {
   }
 
  private:
+  void fit_model(const std::shared_ptr<const TrainingData>& data, bool teach, double time_limit, Work& work) {
+    if (time_limit > 0.0) {
+      TimedTree timed = fit_within(time_limit, data, options_, work.progress());
+      options_ = std::move(timed.options);
+      prepared_ = std::move(timed.prepared);
+      result_ = std::move(timed.fit);
+      time_ = timed.time;
+      return;
+    }
+    Work preparing(work, preparing_share);
+    prepared_.emplace(data, options_, preparing.progress());
+    Work fitting(work, work.left());
+    if (!teach) {
+      result_.emplace(fit(*prepared_, fitting.progress()));
+      return;
+    }
+    taught_ = fit_taught(*prepared_, {.seed = options_.folds.seed}, fitting.progress());
+    prepared_ = taught_->prepared;
+    result_ = taught_->fit;
+  }
+
   report::FitRun run(const std::string& data) const { return {data, options_, prepared_->data(), lines_, ""}; }
 
   report::Document words(const std::string& data) const {
     report::Document words = report::fit_words(run(data), *result_);
+    if (time_) words.notes.push_back(report::time_limit_text(*time_, report::LimitedSize::leaves));
     if (taught_) words.sections.push_back(report::teaching_words(*taught_));
     if (readable_) words.sections.push_back(report::readable_words(*result_, *readable_, asked_));
     return words;
@@ -142,6 +160,7 @@ class Fit {
   std::optional<FitResult> result_;
   std::optional<TaughtResult> taught_;
   std::optional<ReadableResult> readable_;
+  std::optional<TimeLimit> time_;
   std::vector<Eigen::Index> lines_;  // of the rows, counted from 0
 };
 
@@ -150,14 +169,15 @@ std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const 
                                std::vector<std::vector<std::string>> levels, const std::optional<Vector>& weights,
                                const std::optional<Vector>& groups, std::vector<Eigen::Index> held_out,
                                bool may_have_codes, std::optional<double> readable_loss, Eigen::Index readable_rules,
-                               bool teach, const nb::object& report) {
+                               bool teach, double time_limit, const nb::object& report) {
   TrainingData data = training_data_of(inputs, outputs, weights, groups);
   data.held_out = std::move(held_out);
   data.levels = std::move(levels);
   data.may_have_codes = may_have_codes;
   data.input_names = std::move(input_names);
   data.output_names = std::move(output_names);
-  return std::make_unique<Fit>(std::move(data), options_of(options), readable_loss, readable_rules, teach, report);
+  return std::make_unique<Fit>(std::move(data), options_of(options), readable_loss, readable_rules, teach, time_limit,
+                               report);
 }
 
 // Inputs that look as if nobody meant them: (kind, position, detail, whether it is left out).
@@ -260,7 +280,7 @@ void add_fitting(nb::module_& module) {
              nb::arg("input_names"), nb::arg("output_names"), nb::arg("levels"), nb::arg("weights") = nb::none(),
              nb::arg("groups") = nb::none(), nb::arg("held_out") = std::vector<Eigen::Index>(),
              nb::arg("may_have_codes") = true, nb::arg("readable_loss") = nb::none(), nb::arg("readable_rules") = 0,
-             nb::arg("teach") = false, nb::arg("report") = nb::none());
+             nb::arg("teach") = false, nb::arg("time_limit") = 0.0, nb::arg("report") = nb::none());
   module.def("accidental_inputs", &accidental, nb::arg("inputs"), nb::arg("levels"));
   module.def("dominant_rows", &dominant, nb::arg("output"));
   add_stream(module);

@@ -10,7 +10,7 @@ import numpy as np
 from . import _core
 from ._model import BoostedModel
 from ._progress import Bar
-from ._regressor import FitRows, TableRegressor, count, spread
+from ._regressor import FitRows, TableRegressor, count, seconds, spread
 from ._tree import level_names
 from ._views import Views
 
@@ -39,6 +39,9 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
     seeds : int, default=1
         The model is the mean of this many sums, whose splits look at other inputs each. Two are about 2 % more accurate
         in the mean of many tables; to fit and to predict takes as many times as long.
+    time_limit : float or None, default=None
+        Seconds that the fit may take: the model is the sum of the most trees that ends by then.
+        `summary_["time_limit"]["max_rounds"]` given as `max_iter` makes the same model again.
     categorical_features : sequence of str or int, default=()
         Columns that are categories although they hold numbers. Columns of words are categories anyway.
     random_state : int, RandomState or None, default=None
@@ -84,6 +87,7 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
         learning_rate: float | None = None,
         max_iter: int = 2000,
         seeds: int = 1,
+        time_limit: float | None = None,
         categorical_features: Sequence[str | int] = (),
         random_state: Any = None,
         n_jobs: int | None = None,
@@ -91,6 +95,7 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
         self.learning_rate = learning_rate
         self.max_iter = max_iter
         self.seeds = seeds
+        self.time_limit = time_limit
         self.categorical_features = categorical_features
         self.random_state = random_state
         self.n_jobs = n_jobs
@@ -108,6 +113,7 @@ class BoostedLocalLinearTreeRegressor(Views, TableRegressor):
                 weights=rows.weights,
                 groups=rows.groups,
                 held_out=rows.held_out,
+                time_limit=seconds("time_limit", self.time_limit),
                 report=bar,
             )
         self.model_ = BoostedModel.of_handle(fitted.model())

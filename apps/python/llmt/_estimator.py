@@ -11,7 +11,7 @@ from . import _advice, _core
 from ._frames import mean_baseline
 from ._model import Model, StreamModel, TextModel
 from ._progress import Bar
-from ._regressor import FitRows, TableRegressor, check_rows, count, names_of, spread, target_names, weights_of
+from ._regressor import FitRows, TableRegressor, check_rows, count, names_of, seconds, spread, target_names, weights_of
 from ._tree_views import TreeViews
 from .tables import Table, read_table, read_targets
 
@@ -78,6 +78,10 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         Fit the tree, and the readable one, to the answers of a sum of trees (`BoostedLocalLinearTreeRegressor`), on the
         rows and on rows made of them, if that lowers the held-out error. `summary_["teaching"]` has the errors of the
         tree alone, of the taught tree and of the sum. Takes several times as long.
+    time_limit : float or None, default=None
+        Seconds that the fit may take: the model is the tree of the most leaves that ends by then.
+        `summary_["time_limit"]["max_leaves"]` given as `max_leaves` makes the same model again. A readable tree takes its
+        own time.
     random_state : int, RandomState or None, default=None
         Seed of the folds, and of what teaches. None is 1, so that the same rows give the same model.
     n_jobs : int or None, default=None
@@ -127,6 +131,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         readable: bool | float = False,
         readable_rules: int | None = None,
         teach: bool = False,
+        time_limit: float | None = None,
         random_state: Any = None,
         n_jobs: int | None = None,
     ) -> None:
@@ -147,6 +152,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
         self.readable = readable
         self.readable_rules = readable_rules
         self.teach = teach
+        self.time_limit = time_limit
         self.random_state = random_state
         self.n_jobs = n_jobs
 
@@ -170,6 +176,7 @@ class LocalLinearTreeRegressor(TreeViews, TableRegressor):
                 readable_loss=self._readable_loss(),
                 readable_rules=_rules(self.readable_rules),
                 teach=bool(self.teach),
+                time_limit=seconds("time_limit", self.time_limit),
                 report=bar,
             )
         if self.loss == "squared":

@@ -393,6 +393,16 @@ def count(name: str, value: Any) -> int:
     return number
 
 
+def seconds(name: str, value: Any) -> float:
+    """A time above 0; None is 0, no limit."""
+    if value is None:
+        return 0.0
+    number = float("nan") if isinstance(value, (bool, str)) else float(value)
+    if not 0.0 < number < float("inf"):
+        raise ValueError(f"{name} is {value!r}; it must be a number of seconds above 0, or None")
+    return number
+
+
 def spread(values: np.ndarray, most: int) -> np.ndarray:
     """At most so many rows as importance() looks at, evenly spaced."""
     rows = len(values)

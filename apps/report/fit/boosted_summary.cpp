@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "report/fit/mean_of_rows.hpp"
+#include "report/fit/time_limit.hpp"
 
 namespace llmt::report {
 namespace {
@@ -60,6 +61,7 @@ Json boosted_json(const BoostedRun& run, const BoostResult& result) {
                             {"rate", result.model.sums()[o].rate}});
     if (summary.seeds > 1) json["sums"].back()["seeds"] = summary.seeds;
   }
+  if (run.time) json["time_limit"] = time_limit_json(*run.time, LimitedSize::rounds);
   json["model"] = run.output.empty() ? Json(nullptr) : Json(run.output);
   return json;
 }
@@ -86,6 +88,7 @@ std::string boosted_text(const BoostedRun& run, const BoostResult& result, std::
     }
   }
   text += wrapped(rare_levels_text(result.model), width);
+  if (run.time) text += wrapped(time_limit_text(*run.time, LimitedSize::rounds) + ".\n", width);
   if (const int seeds = result.summaries.front().seeds; seeds > 1) {
     text += wrapped(
         fmt::format("Each sum is the mean of those of {} seeds; what was compared is of the first.\n", seeds), width);

@@ -54,12 +54,15 @@ bool are_alike(double correlation, Eigen::Index rows) {
   return correlation > std::max(weak, 5.0 / std::sqrt(static_cast<double>(rows)));
 }
 
-std::string neighbours_text(double correlation, double rmse, double rmse_contiguous) {
+std::string neighbours_text(double correlation, double rmse, std::optional<double> rmse_contiguous) {
+  const std::string of_blocks =
+      rmse_contiguous ? fmt::format("; with blocks of consecutive rows held out it is {}", number(*rmse_contiguous))
+                      : "";
   return fmt::format(
       "Rows that follow each other are alike: their held-out errors have a correlation of {:.2f}. RMSE held-out {} is "
-      "for new rows between those of the table; with blocks of consecutive rows held out it is {}. For rows of another "
+      "for new rows between those of the table{}. For rows of another "
       "time or path use --contiguous, or --groups if a column says which rows belong together",
-      correlation, number(rmse), number(rmse_contiguous));
+      correlation, number(rmse), of_blocks);
 }
 
 }  // namespace llmt::report

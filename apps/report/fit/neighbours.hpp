@@ -2,6 +2,8 @@
 /// Whether rows that follow each other are alike, so that random folds say too little of the error on other stretches.
 #pragma once
 
+#include <optional>
+
 #include "llmt/fit.hpp"
 
 namespace llmt::report {
@@ -16,7 +18,8 @@ double neighbours_correlation(const TrainingData& data, const FitOptions& option
 /// random order have 1 / sqrt(rows) as its standard error.
 bool are_alike(double correlation, Eigen::Index rows);
 
-/// "Held-out errors of rows that follow each other go together (correlation 0.83): ...".
-std::string neighbours_text(double correlation, double rmse, double rmse_contiguous);
+/// "Rows that follow each other are alike: their held-out errors have a correlation of 0.83 ...". `rmse_contiguous`:
+/// with blocks of rows held out; empty: not measured.
+std::string neighbours_text(double correlation, double rmse, std::optional<double> rmse_contiguous);
 
 }  // namespace llmt::report

@@ -51,5 +51,6 @@
 #include "llmt/stream_options.hpp"
 #include "llmt/summary.hpp"
 #include "llmt/teach.hpp"
+#include "llmt/time_limit.hpp"
 #include "llmt/training_data.hpp"
 #include "llmt/training_record.hpp"

@@ -41,6 +41,9 @@ struct LeafRecord {
 struct TrainingRecord {
   std::vector<InputRecord> inputs = {};              ///< one an input of the model
   std::vector<std::vector<LeafRecord>> leaves = {};  ///< of each output, as Model::leaves(); empty: not known
+  /// What limited the size of the model: FitOptions::max_leaves or BoostOptions::max_rounds, given by the caller or
+  /// found by a time limit. 0: their defaults.
+  Eigen::Index size_limit = 0;
 
   bool empty() const { return inputs.empty(); }
   bool operator==(const TrainingRecord&) const = default;
@@ -53,7 +56,7 @@ InputRecord record_of(const Eigen::Ref<const Eigen::VectorXd>& values, std::size
 
 /// Throws std::invalid_argument if a record does not fit a model: another number of inputs or levels, values that do
 /// not ascend or are not finite, another number of counts than of values, a count below 0, another number of outputs
-/// than `outputs`, a square that is negative or not finite.
+/// than `outputs`, a square that is negative or not finite, a limit below 0.
 void check_record(const TrainingRecord& record, const std::vector<InputColumn>& inputs, std::size_t outputs);
 
 }  // namespace llmt

@@ -57,4 +57,11 @@ inline void check_columns(const char* function, const char* argument, const std:
   }
 }
 
+/// Checks that a time limit is a finite number of seconds above 0.
+inline void check_seconds(const char* function, double seconds) {
+  if (std::isfinite(seconds) && seconds > 0.0) return;
+  throw std::invalid_argument(
+      fmt::format("{}: a time limit of {} s, it must be finite and above 0", function, seconds));
+}
+
 }  // namespace llmt

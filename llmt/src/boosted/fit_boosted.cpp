@@ -264,8 +264,9 @@ std::vector<Gap> gaps_of(const BoostingData& data) {
 }
 
 // The record of the inputs that the sums use, where the caller has them.
-TrainingRecord record_of_rows(const BoostingData& data, const std::vector<bool>& used) {
+TrainingRecord record_of_rows(const BoostingData& data, const std::vector<bool>& used, int max_rounds) {
   TrainingRecord record;
+  if (max_rounds != BoostOptions().max_rounds) record.size_limit = max_rounds;
   record.inputs.resize(data.inputs.size());
   const Eigen::MatrixXd x = with_empty_levels(data.inputs, data.x);
   for (std::size_t j = 0; j < data.inputs.size(); ++j) {
@@ -276,7 +277,7 @@ TrainingRecord record_of_rows(const BoostingData& data, const std::vector<bool>&
 }
 
 // The model with its inputs where the caller has them.
-BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
+BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums, int max_rounds) {
   std::vector<InputColumn> inputs(data.inputs.size());
   std::vector<double> deviations(data.inputs.size());
   for (std::size_t j = 0; j < data.inputs.size(); ++j) {
@@ -292,7 +293,7 @@ BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums) {
   }
   const BoostedModel model(inputs, data.outputs, deviations, sums);
   return {std::move(inputs), data.outputs,  std::move(deviations),
-          std::move(sums),   gaps_of(data), record_of_rows(data, used_inputs(model))};
+          std::move(sums),   gaps_of(data), record_of_rows(data, used_inputs(model), max_rounds)};
 }
 
 }  // namespace
@@ -313,7 +314,7 @@ BoostResult fit_boosted(const TrainingData& data, const BoostOptions& options, c
     Work part(work, work.left() / static_cast<double>(rows.y.cols() - output));
     sums.push_back(fit_output(deals, output, options, summaries.emplace_back(), part));
   }
-  BoostResult result{model_of(rows, std::move(sums)), std::move(summaries)};
+  BoostResult result{model_of(rows, std::move(sums), options.max_rounds), std::move(summaries)};
   work.finish();
   return result;
 }

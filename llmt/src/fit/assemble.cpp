@@ -82,10 +82,10 @@ Intervals make_intervals(const Training& training, std::vector<std::optional<Fit
     models.push_back(make_model(rows.training, std::move(partitions)));
     held_out.emplace_back(rows.held_out.rows);
   }
-  return held_out_intervals(
-      std::move(models), of_all,
-      {table.inputs, table.outputs, training.kept->precisions, copies_of(*training.kept), std::move(held_out)},
-      training.options.max_threads);
+  return held_out_intervals(std::move(models), of_all,
+                            {table.inputs, table.outputs, training.kept->precisions, copies_of(*training.kept),
+                             std::move(held_out), training.options.max_leaves},
+                            training.options.max_threads);
 }
 
 }  // namespace

@@ -128,7 +128,7 @@ std::vector<InputRecord> record_of_inputs(const Model& model, const MeasuredRows
 Intervals held_out_intervals(std::vector<Model> models, const Model& of_all, const MeasuredRows& rows,
                              int max_threads) {
   if (models.empty()) return {};
-  const auto& [inputs, outputs, precisions, copies, held_out] = rows;
+  const auto& [inputs, outputs, precisions, copies, held_out, size_limit] = rows;
   const bool is_one_fold = models.size() == 1;
   const DealtFolds folds = dealt(held_out);
   const std::vector<InputColumn>& columns = models.front().inputs();
@@ -163,7 +163,8 @@ Intervals held_out_intervals(std::vector<Model> models, const Model& of_all, con
   }
   std::vector<Gap> gaps = gaps_of(models, inputs);
   TrainingRecord record{.inputs = record_of_inputs(of_all, rows),
-                        .leaves = record_of_leaves(of_all, x, residuals, max_threads)};
+                        .leaves = record_of_leaves(of_all, x, residuals, max_threads),
+                        .size_limit = size_limit};
   return {std::move(models), std::move(parts), std::move(gaps), std::move(record)};
 }
 

@@ -17,6 +17,7 @@ struct MeasuredRows {
   const Eigen::VectorXd& precisions;           ///< weights; empty: none
   std::vector<int> copies;                     ///< how often each row counts
   std::vector<std::span<const int>> held_out;  ///< by each fold
+  Eigen::Index size_limit = 0;                 ///< TrainingRecord::size_limit
 };
 
 /// The intervals of the folds' models with the absolute residuals of the rows that each fold held out, and the record

@@ -40,6 +40,7 @@ Json json_of(const TrainingRecord& record) {
     json["counts"] = input.counts;
   }
   Json json = {{"inputs", std::move(inputs)}};
+  if (record.size_limit > 0) json["size_limit"] = record.size_limit;
   for (const std::vector<LeafRecord>& of_output : record.leaves) {
     Json& leaves = json["leaves"].emplace_back(Json::array());
     for (const LeafRecord& leaf : of_output) leaves.push_back({leaf.rows, leaf.mean_square});
@@ -71,6 +72,7 @@ TrainingRecord record_from(const JsonReader& model) {
     if (json.has("values")) input.values = json.member("values").list<double>();
     if (json.has("counts")) input.counts = json.member("counts").list<Eigen::Index>();
   }
+  record.size_limit = training.as<Eigen::Index>("size_limit", 0);
   if (!training.has("leaves")) return record;
   for (const JsonReader& of_output : training.member("leaves").elements()) {
     std::vector<LeafRecord>& leaves = record.leaves.emplace_back();

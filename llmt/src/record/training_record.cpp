@@ -107,6 +107,7 @@ void check_record(const TrainingRecord& record, const std::vector<InputColumn>& 
   if (!record.leaves.empty() && record.leaves.size() != outputs) {
     refuse_record(fmt::format("leaves of {} outputs of {}", record.leaves.size(), outputs));
   }
+  if (record.size_limit < 0) refuse_record("the limit of the size is negative");
   for (const std::vector<LeafRecord>& of_output : record.leaves) {
     for (const LeafRecord& leaf : of_output) {
       if (leaf.rows < 0 || !std::isfinite(leaf.mean_square) || leaf.mean_square < 0.0) {
