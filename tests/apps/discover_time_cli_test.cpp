@@ -112,6 +112,7 @@ TEST(DiscoverInTime, CorrectedTablesKeepTimesAndRuns) {
   const json found = json::parse(llmt::read_file(folder.file("found.json")));
   EXPECT_EQ(found["time"]["column"], "t");
   EXPECT_EQ(found["time"]["group"], "run");
+  EXPECT_EQ(found["time"]["filtered"], false);  // these rows went through no filter
 }
 
 TEST(DiscoverInTime, ApplyPrintsTheGapOfEachRun) {

@@ -115,6 +115,7 @@ Json time_json(const TermsSummary& summary) {
   return {{"column", summary.time},
           {"group", summary.group},
           {"found_out", time.found_out},
+          {"filtered", time.filtered},
           {"step", time.step},
           {"rows_per_sample", time.rows_per_sample},
           {"samples", time.samples},
