@@ -35,6 +35,23 @@ void inspect_sum(const InspectArguments& arguments) {
   }
 }
 
+void inspect_trees(const InspectArguments& arguments) {
+  const auto [model, intervals] = load_model(arguments.model, true);
+  if (arguments.rules) {
+    print(report::rules_text(model, arguments.model, output_width()));
+    return;
+  }
+  const Eigen::Index most = intervals.record().size_limit;
+  if (arguments.json) {
+    Json json = report::leaves_json(model);
+    if (most > 0) json["max_leaves"] = most;
+    print_json(json);
+    return;
+  }
+  print(report::leaves_text(model, arguments.model, output_width()));
+  if (most > 0) print(fmt::format("\nFitted with at most {} leaves a tree, as --max-leaves {} does\n", most, most));
+}
+
 }  // namespace
 
 void add_inspect(CLI::App& app) {
@@ -51,14 +68,7 @@ void add_inspect(CLI::App& app) {
       inspect_sum(*arguments);
       return;
     }
-    const Model model = load_model(arguments->model);
-    if (arguments->json) {
-      print_json(report::leaves_json(model));
-    } else if (arguments->rules) {
-      print(report::rules_text(model, arguments->model, output_width()));
-    } else {
-      print(report::leaves_text(model, arguments->model, output_width()));
-    }
+    inspect_trees(*arguments);
   });
 }
 

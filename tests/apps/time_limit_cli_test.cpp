@@ -43,7 +43,12 @@ TEST(TimeLimit, NamesTheOptionThatMakesTheSameFile) {
     EXPECT_EQ(llmt::read_file(folder.file("timed.json")), llmt::read_file(folder.file("again.json")));
     EXPECT_EQ(json::parse(llmt::read_file(folder.file("timed.json")))["training"]["size_limit"],
               again[0] == '-' && *form ? 32 : 8);
+    const Outcome inspected = folder.run(LLMT_PROGRAM " inspect timed.json");
+    EXPECT_NE(inspected.out.find(fmt::format("as {} does", again)), std::string::npos) << inspected.out;
+    const json facts = json::parse(folder.run(LLMT_PROGRAM " inspect timed.json --json").out);
+    EXPECT_EQ(facts.contains("max_rounds") ? facts["max_rounds"] : facts["max_leaves"], *form ? 32 : 8);
     ASSERT_EQ(fit_waves(folder, fmt::format("{} -o whole.json", form)).exit_code, 0);
+    EXPECT_EQ(folder.run(LLMT_PROGRAM " inspect whole.json").out.find("Fitted with at most"), std::string::npos);
     EXPECT_NE(llmt::read_file(folder.file("timed.json")), llmt::read_file(folder.file("whole.json")));
   }
 }

@@ -65,6 +65,9 @@ std::string boosted_inspection_text(const BoostedModel& model, const std::string
     }
   }
   text += inputs.text(width);
+  if (const Eigen::Index most = model.record().size_limit; most > 0) {
+    text += fmt::format("\nFitted with at most {} rounds, as --max-rounds {} does\n", most, most);
+  }
   for (std::size_t o = 0; o < model.sums().size(); ++o) {
     const BoostedSum& sum = model.sums()[o];
     const Uses uses = uses_of(model, sum);
@@ -96,6 +99,7 @@ std::string boosted_inspection_text(const BoostedModel& model, const std::string
 Json boosted_inspection_json(const BoostedModel& model) {
   const BoostedSize size = size_of(model);
   Json json = {{"trees", size.trees}, {"leaves", size.leaves}, {"parameters", size.parameters}};
+  if (const Eigen::Index most = model.record().size_limit; most > 0) json["max_rounds"] = most;
   json["inputs"] = Json::array();
   for (const InputColumn& input : model.inputs()) {
     json["inputs"].push_back(
