@@ -10,12 +10,15 @@
 #include "dynamics/delays.hpp"
 #include "dynamics/held_out_runs.hpp"
 #include "dynamics/model_structure.hpp"
+#include "dynamics/other_orders.hpp"
 #include "dynamics/windows.hpp"
+#include "llmt/static_curve.hpp"
 
 namespace llmt {
 namespace {
 
 constexpr int estimate_iterations = 60;
+constexpr double hardly_worse = 1.25;  // the factor that an output which adds up is allowed, too
 
 RunErrors errors_of(const Judged& judged, const Eigen::VectorXd& scale) {
   RunErrors errors;
@@ -42,6 +45,19 @@ std::vector<StretchFold> folds_of(const std::vector<Stretch>& stretches, Eigen::
   count = std::ssize(folds);
   for (StretchFold& fold : cut(stretches, 7)) folds.push_back(std::move(fold));
   return folds;
+}
+
+// Whether the model comes to rest within the range of the record wherever its static curve says that it rests there,
+// and stays near that range over the record's inputs in other orders.
+bool is_calm(const Task& task, const DynamicParts& parts, const std::vector<Stretch>& stretches) {
+  const DynamicModel model(parts);
+  for (Eigen::Index input = 0; input < model.num_inputs(); ++input) {
+    const StaticCurve curve = static_curve(model, input);
+    if (std::ranges::any_of(curve.points, [](const RestPoint& rest) { return rest.is_inside && !rest.is_stable; })) {
+      return false;
+    }
+  }
+  return stays_over_other_orders(task, parts, stretches, 1.0);
 }
 
 DynamicCandidate compared(const Task& task, const Trial& trial) {
@@ -111,18 +127,26 @@ DynamicFit fit_dynamic(const Series& series, const DynamicOptions& options, cons
   std::size_t taken = chosen.chosen;
   DynamicParts parts = estimate(task, chosen.trials[taken].candidate, stretches, estimate_iterations);
   Judged training = judge(task, parts, stretches);
-  // A model that does not even stay within its bounds over its own records gives way to the next best.
-  for (std::size_t k = 0; k < chosen.trials.size() && training.diverged > 0; ++k) {
-    if (chosen.trials[k].judged.diverged > 0) continue;
-    DynamicParts other = estimate(task, chosen.trials[k].candidate, stretches, estimate_iterations);
+  bool calm = training.diverged == 0 && is_calm(task, parts, stretches);
+  // A model that leaves its bounds over its own records gives way to the next best that does not, and one that is not
+  // calm to a calm one that is hardly worse.
+  const double least = chosen.trials[taken].error;
+  for (std::size_t k = 0; k < chosen.trials.size() && !calm; ++k) {
+    const Trial& trial = chosen.trials[k];
+    if (k == taken || trial.judged.diverged > 0) continue;
+    if (training.diverged == 0 && trial.error > hardly_worse * least) continue;
+    DynamicParts other = estimate(task, trial.candidate, stretches, estimate_iterations);
     const Judged of_other = judge(task, other, stretches);
     if (of_other.diverged > 0) continue;
+    calm = is_calm(task, other, stretches);
+    if (!calm && training.diverged == 0) continue;
     taken = k;
     parts = std::move(other);
     training = of_other;
   }
   const Trial& best = chosen.trials[taken];
-  parts.is_stable = best.judged.diverged == 0 && training.diverged == 0;
+  parts.is_stable = best.judged.diverged == 0 && training.diverged == 0 &&
+                    (calm || stays_over_other_orders(task, parts, stretches, ranges_outside));
   Eigen::Index whole = 0;
   const std::vector<StretchFold> folds = folds_of(stretches, rows, whole);
   const int iterations = rows > search_rows ? final_iterations : search_iterations;

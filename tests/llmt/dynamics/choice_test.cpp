@@ -11,6 +11,7 @@
 #include "llmt/dynamic_analysis.hpp"
 #include "llmt/dynamics/systems.hpp"
 #include "llmt/fit_dynamic.hpp"
+#include "llmt/static_curve.hpp"
 
 namespace {
 
@@ -29,6 +30,40 @@ TEST(DynamicChoice, AStopIsFoundAndHelps) {
   const llmt::DynamicFit fit = llmt::fit_dynamic(series, options);
   EXPECT_EQ(fit.model.parts().outputs[0].upper_stop, 1.0);
   EXPECT_EQ(fit.model.parts().outputs[0].lower_stop, -std::numeric_limits<double>::infinity());
+}
+
+// A tank whose outflow is a root of its level. Of 300 rows with noise the polynomial of least error has a state of rest
+// within its range that it does not come back to, and over other inputs it swings about it.
+TEST(DynamicChoice, AModelThatIsUnstableAtRestGivesWayToOneThatIsHardlyWorse) {
+  std::uint32_t state = 10;
+  const auto drawn = [&] {
+    state = 1664525U * state + 1013904223U;
+    return state / 4294967296.0;
+  };
+  for (int k = 0; k < 5; ++k) drawn();
+  constexpr Eigen::Index rows = 300;
+  Series series;
+  series.input_names = {"u"};
+  series.output_names = {"y"};
+  series.inputs.resize(rows, 1);
+  series.outputs.resize(rows, 1);
+  double level = 0.5, before = 0.0, u = 0.0;
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    if (row % 3 == 0) u = 2.0 * drawn() - 1.0;
+    level += 0.0565 * (before + 1.0) - 0.1234 * std::sqrt(level);
+    series.inputs(row, 0) = u;
+    const double noise = drawn() + drawn() + drawn() - 1.5;
+    series.outputs(row, 0) = level + 0.004 * noise;
+    before = u;
+  }
+  llmt::DynamicOptions options;
+  options.lags = llmt::Lags{{{1, 2}}, {{0, 1, 2, 3, 4}}};
+  const llmt::DynamicFit fit = llmt::fit_dynamic(series, options);
+  const llmt::StaticCurve curve = llmt::static_curve(fit.model, 0);
+  for (const llmt::RestPoint& rest : curve.points) EXPECT_TRUE(rest.is_stable || !rest.is_inside) << rest.input;
+  const llmt::DynamicSummary& summary = fit.summary;
+  EXPECT_GT(summary.compared[summary.chosen].error, summary.compared.front().error);
+  EXPECT_LT(summary.compared[summary.chosen].error, 1.25 * summary.compared.front().error);
 }
 
 // A slide driven by a force: its position adds up. The value of the position says nothing, and a model that uses it

@@ -9,6 +9,7 @@
 #include "dynamics/held_out_runs.hpp"
 #include "dynamics/model_structure.hpp"
 #include "dynamics/one_step.hpp"
+#include "dynamics/other_orders.hpp"
 #include "dynamics/polynomial.hpp"
 #include "dynamics/windows.hpp"
 #include "llmt/dynamic_analysis.hpp"
@@ -118,6 +119,39 @@ TEST(DynamicParts, ARunThatLeavesAtOnceIsJudgedByItsBound) {
   EXPECT_EQ(judged.runs, 1);
   EXPECT_EQ(judged.diverged, 1);
   EXPECT_EQ(judged.squares(0), 3.0 * 20.0 * 20.0);
+}
+
+// y(t) = a y(t-1) + b u(t-1) over inputs that are high for long stretches in some order only. The record alternates, so
+// its own run stays within its range; a run of ten times its rows meets more of the same side.
+TEST(DynamicParts, RunsOverOtherOrdersLeaveTheRangeThatTheRecordKeeps) {
+  Eigen::VectorXd inputs(200);
+  for (Eigen::Index row = 0; row < inputs.size(); ++row) inputs(row) = row % 2 == 0 ? 1.0 : -1.0;
+  const llmt::Series series = measured(inputs, Eigen::VectorXd::Zero(inputs.size()));
+  const auto stays = [&](double a, double b, double ranges) {
+    const llmt::DynamicParts parts = line_that_moves(a, b);
+    const llmt::Task task = llmt::task_of(series, {});
+    llmt::Task of_range = task;
+    of_range.outputs = parts.outputs;  // -1 to 1
+    return llmt::stays_over_other_orders(of_range, parts, {{0, inputs.size()}}, ranges);
+  };
+  // The record's own run ends within b / (1 + a), at rest |y| would be b / (1 - a).
+  EXPECT_TRUE(stays(0.5, 0.5, 1.0));
+  EXPECT_TRUE(stays(0.9, 0.2, 1.0));
+  EXPECT_FALSE(stays(0.9, 2.0, 1.0));  // within 1.06 over the record
+  EXPECT_TRUE(stays(0.9, 2.0, 10.0));
+  EXPECT_FALSE(stays(1.05, 0.1, 10.0));  // unstable
+}
+
+// Where an output adds up a run over other inputs may end anywhere, and without inputs there is no other order.
+TEST(DynamicParts, OtherOrdersSayNothingOfOutputsThatAddUp) {
+  const Eigen::VectorXd inputs = Eigen::VectorXd::LinSpaced(100, -1.0, 1.0);
+  const llmt::Series series = measured(inputs, Eigen::VectorXd::Zero(100));
+  llmt::DynamicParts parts = line_that_moves(1.05, 1.0);
+  llmt::Task task = llmt::task_of(series, {});
+  task.outputs = parts.outputs;
+  EXPECT_FALSE(llmt::stays_over_other_orders(task, parts, {{0, 100}}, 10.0));
+  parts.lags.adds_up = {true};
+  EXPECT_TRUE(llmt::stays_over_other_orders(task, parts, {{0, 100}}, 10.0));
 }
 
 // Two outputs that do not see each other, each at rest at 2 b u. A state counts up to one range beyond the range.
