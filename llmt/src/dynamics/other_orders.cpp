@@ -53,8 +53,7 @@ std::vector<Eigen::Index> other_order(const Series& series, const std::vector<St
 
 }  // namespace
 
-bool stays_over_other_orders(const Task& task, const DynamicParts& parts, const std::vector<Stretch>& stretches,
-                             double ranges) {
+bool stays_over_other_orders(const Task& task, const DynamicParts& parts, const std::vector<Stretch>& stretches) {
   if (task.series.inputs.cols() == 0 || std::ranges::count(parts.lags.adds_up, true) > 0) return true;
   const Eigen::Index memory = longest_lag(parts.lags);
   std::vector<Stretch> long_enough;
@@ -65,13 +64,8 @@ bool stays_over_other_orders(const Task& task, const DynamicParts& parts, const 
     all += stretch.rows();
   }
   if (long_enough.empty()) return true;
-  Eigen::VectorXd lower(std::ssize(task.outputs));
-  Eigen::VectorXd upper(lower.size());
-  for (Eigen::Index o = 0; o < lower.size(); ++o) {
-    const double range = ranges * (task.outputs[o].high - task.outputs[o].low);
-    lower(o) = task.outputs[o].low - range;
-    upper(o) = task.outputs[o].high + range;
-  }
+  const Eigen::VectorXd lower = lower_bounds(task.outputs);
+  const Eigen::VectorXd upper = upper_bounds(task.outputs);
   Random random(1);
   for (int k = 0; k < num_orders; ++k) {
     const std::vector<Eigen::Index> rows =

@@ -6,6 +6,11 @@
 #include "dynamics/one_step.hpp"
 
 namespace llmt {
+namespace {
+
+constexpr double ranges_outside = 10.0;
+
+}  // namespace
 std::vector<Window> windows_of(const std::vector<Stretch>& stretches, Eigen::Index initial, Eigen::Index horizon) {
   std::vector<Window> windows;
   for (const Stretch& stretch : stretches) {

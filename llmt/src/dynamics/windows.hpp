@@ -74,9 +74,6 @@ inline double held_at_stops(const Signal& output, double value) {
 Eigen::Index run_window(const DynamicParts& parts, const Series& series, const Window& window,
                         const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, Eigen::MatrixXd& outputs);
 
-/// By how many ranges of the training record a run may leave that range.
-inline constexpr double ranges_outside = 10.0;
-
 /// The bounds of a run, see DynamicModel::lower().
 Eigen::VectorXd lower_bounds(const std::vector<Signal>& outputs);
 Eigen::VectorXd upper_bounds(const std::vector<Signal>& outputs);

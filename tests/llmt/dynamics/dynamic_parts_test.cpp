@@ -127,19 +127,17 @@ TEST(DynamicParts, RunsOverOtherOrdersLeaveTheRangeThatTheRecordKeeps) {
   Eigen::VectorXd inputs(200);
   for (Eigen::Index row = 0; row < inputs.size(); ++row) inputs(row) = row % 2 == 0 ? 1.0 : -1.0;
   const llmt::Series series = measured(inputs, Eigen::VectorXd::Zero(inputs.size()));
-  const auto stays = [&](double a, double b, double ranges) {
+  const auto stays = [&](double a, double b) {
     const llmt::DynamicParts parts = line_that_moves(a, b);
-    const llmt::Task task = llmt::task_of(series, {});
-    llmt::Task of_range = task;
-    of_range.outputs = parts.outputs;  // -1 to 1
-    return llmt::stays_over_other_orders(of_range, parts, {{0, inputs.size()}}, ranges);
+    llmt::Task task = llmt::task_of(series, {});
+    task.outputs = parts.outputs;  // -1 to 1, so the bounds are -21 and 21
+    return llmt::stays_over_other_orders(task, parts, {{0, inputs.size()}});
   };
-  // The record's own run ends within b / (1 + a), at rest |y| would be b / (1 - a).
-  EXPECT_TRUE(stays(0.5, 0.5, 1.0));
-  EXPECT_TRUE(stays(0.9, 0.2, 1.0));
-  EXPECT_FALSE(stays(0.9, 2.0, 1.0));  // within 1.06 over the record
-  EXPECT_TRUE(stays(0.9, 2.0, 10.0));
-  EXPECT_FALSE(stays(1.05, 0.1, 10.0));  // unstable
+  // Over the record |y| stays below b / (1 + a); with one side for long it would be b / (1 - a).
+  EXPECT_TRUE(stays(0.5, 0.5));
+  EXPECT_TRUE(stays(0.9, 2.0));
+  EXPECT_FALSE(stays(0.99, 10.0));  // 5.03 over the record
+  EXPECT_FALSE(stays(1.05, 0.1));   // unstable
 }
 
 // Where an output adds up a run over other inputs may end anywhere, and without inputs there is no other order.
@@ -149,9 +147,9 @@ TEST(DynamicParts, OtherOrdersSayNothingOfOutputsThatAddUp) {
   llmt::DynamicParts parts = line_that_moves(1.05, 1.0);
   llmt::Task task = llmt::task_of(series, {});
   task.outputs = parts.outputs;
-  EXPECT_FALSE(llmt::stays_over_other_orders(task, parts, {{0, 100}}, 10.0));
+  EXPECT_FALSE(llmt::stays_over_other_orders(task, parts, {{0, 100}}));
   parts.lags.adds_up = {true};
-  EXPECT_TRUE(llmt::stays_over_other_orders(task, parts, {{0, 100}}, 10.0));
+  EXPECT_TRUE(llmt::stays_over_other_orders(task, parts, {{0, 100}}));
 }
 
 // Two outputs that do not see each other, each at rest at 2 b u. A state counts up to one range beyond the range.
