@@ -12,7 +12,7 @@ namespace llmt::report {
 /// What a time limit sets: of a tree its leaves, of a sum its rounds.
 enum class LimitedSize { leaves, rounds };
 
-/// "Time limit of 10 s: enough for 64 leaves at most; the same model again: --max-leaves 64".
+/// "Time limit of 10 s: enough for 64 leaves of a tree at most; the same model again: --max-leaves 64".
 std::string time_limit_text(const TimeLimit& time, LimitedSize size);
 
 /// Seconds given and taken, whether the limit was reached, and the size: "max_leaves" or "max_rounds".
