@@ -167,6 +167,19 @@ TEST(LawTerms, NoLimitAndNoDeadBandEndsBelowZero) {
   }
 }
 
+// What the formula says holds for other rows too, which may begin earlier: exp(-(t - 5) / 3), whatever t is.
+TEST(LawTerms, ASettlingGoesOnBelowTheSmallestInput) {
+  const Inputs inputs{{"t"}, Eigen::VectorXd::LinSpaced(41, 5.0, 25.0)};
+  const std::vector<ModelTerm> terms = standard_terms(inputs);
+  const auto settling = std::ranges::find(terms, "settling", &ModelTerm::family);
+  ASSERT_NE(settling, terms.end());
+  const Eigen::VectorXd times = Eigen::VectorXd::LinSpaced(11, 0.0, 10.0);
+  const Rows rows{.inputs = times, .simulated = Eigen::VectorXd::Zero(11), .sequence = {}, .instants = {}};
+  const Eigen::VectorXd column = settling->columns(rows, Eigen::VectorXd::Constant(1, 3.0)).col(0);
+  for (Eigen::Index i = 0; i < 11; ++i) EXPECT_DOUBLE_EQ(column(i), std::exp((5.0 - times(i)) / 3.0)) << times(i);
+  EXPECT_EQ(settling->code, std::vector<std::string>{"exp(-($1 - (5))/$c)"});
+}
+
 TEST(LawTerms, AnglesAreKnownByTheirNamesAndRanges) {
   const auto has_harmonics = [](const std::string& name, double range) {
     const Inputs inputs{{name}, Eigen::VectorXd::LinSpaced(50, -0.5 * range, 0.5 * range)};

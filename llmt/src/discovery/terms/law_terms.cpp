@@ -14,8 +14,6 @@ namespace {
 // These laws contain simpler terms, or come close to them: they must explain that much better.
 constexpr double cost_of_generality = 6.0;
 
-constexpr double largest_exponent = 700.0;
-
 std::vector<double> geometric(double first, double last, int count) {
   std::vector<double> values;
   for (int k = 0; k < count; ++k) values.push_back(first * std::pow(last / first, k / static_cast<double>(count - 1)));

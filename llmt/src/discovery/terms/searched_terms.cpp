@@ -117,9 +117,9 @@ ModelTerm settling(const InputView& input) {
   return searched_term(input, "settling", fmt::format("exp(-{}/tau)", since), {"A"}, "",
                        smooth_constant(input, "tau", time_constants(input)),
                        [low = input.low](const Eigen::ArrayXd& values, double tau) -> Eigen::MatrixXd {
-                         return (-(values - low).max(0.0) / std::max(tau, smallest_divisor)).exp().matrix();
+                         return ((low - values) / std::max(tau, smallest_divisor)).min(largest_exponent).exp().matrix();
                        },
-                       {fmt::format("exp(-max(0, $1 - ({}))/$c)", input.low)});
+                       {fmt::format("exp(-($1 - ({}))/$c)", input.low)});
 }
 
 // Functions of inputs that change sign: those that saturate on both sides, and friction that falls as the speed grows.

@@ -19,6 +19,8 @@ namespace llmt::discovery {
 
 /// Where a value may be 0, as a constant on the way of a fit, this is divided by.
 inline constexpr double smallest_divisor = 1e-300;
+/// The exponential of more is no number.
+inline constexpr double largest_exponent = 700.0;
 
 /// A term on one output with its constants and coefficients.
 struct PlacedTerm {
