@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "calibration/orientation_mistake.hpp"
 #include "llmt/robotics/calibration_report.hpp"
@@ -88,6 +92,62 @@ TEST(LikelyMistake, TheOrderOfAnglesAndQuaternionsIsNamed) {
   seen.orientation = to_orientation(rotations, "");
   EXPECT_EQ(likely_orientation_mistake(ur_like(), with_orientations(seen, ur_like().chain))->name,
             "orientation_inverse");
+}
+
+// Mean angle, deg, by which rotations differ from their mean: the eigenvector of the sum of q q' (Markley et al. 2007).
+double scatter_deg(const std::vector<Eigen::Matrix3d>& rotations) {
+  Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
+  for (const Eigen::Matrix3d& own : rotations) {
+    const Eigen::Quaterniond q(own);
+    sum += q.coeffs() * q.coeffs().transpose();
+  }
+  const Eigen::Vector4d best = Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(sum).eigenvectors().col(3);
+  const Eigen::Quaterniond mean(best);
+  double angles = 0.0;
+  for (const Eigen::Matrix3d& own : rotations) angles += mean.angularDistance(Eigen::Quaterniond(own));
+  return angles / static_cast<double>(rotations.size()) / degree;
+}
+
+// Of few or widely scattered rotations the matrix nearest to all may be a reflection; the mean is a rotation all the
+// same. Where orientations are read wrongly they scatter widely.
+TEST(LikelyMistake, HowFarOrientationsScatterAsTheyAreReadIsSaid) {
+  int reflections = 0;
+  for (const std::uint64_t seed : {4, 5, 6}) {
+    Measurements seen = measure(ur_like(), random_poses(ur_like().chain, 10, seed), 0.0, 5);
+    std::vector<Eigen::Matrix3d> rotations;
+    for (const Pose& pose : tool_poses(ur_like(), seen.poses)) rotations.push_back(pose.rotation);
+    for (const std::string read : {"intrinsic_xzy", "intrinsic_yxz", "intrinsic_yzx", "intrinsic_zxy"}) {
+      Robot described = ur_like();
+      described.chain.orientation = read;
+      seen.orientation = to_orientation(rotations, "intrinsic_xyz");
+      std::vector<Eigen::Matrix3d> between = rotations_of(seen.orientation, read);
+      Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+      for (std::size_t k = 0; k < between.size(); ++k) {
+        between[k] = rotations[k].transpose() * between[k];
+        sum += between[k];
+      }
+      reflections += sum.determinant() < 0.0 ? 1 : 0;
+      const auto found = likely_orientation_mistake(described, with_orientations(seen, described.chain));
+      ASSERT_TRUE(found) << read;
+      const std::string before = "instead of ";
+      const double said = std::stod(found->sentence.substr(found->sentence.find(before) + before.size()));
+      EXPECT_NEAR(said, scatter_deg(between), 0.006 * said) << read << ", seed " << seed;
+    }
+  }
+  EXPECT_GT(reflections, 0);
+}
+
+TEST(LikelyMistake, OfOrientationsTakesTenOfThem) {
+  for (const Eigen::Index count : {9, 10}) {
+    Measurements seen = measure(ur_like(), random_poses(ur_like().chain, count, 4), 0.0, 5);
+    std::vector<Eigen::Matrix3d> rotations;
+    for (const Pose& pose : tool_poses(ur_like(), seen.poses)) rotations.push_back(pose.rotation);
+    seen.orientation = to_orientation(rotations, "intrinsic_xyz");
+    Robot described = ur_like();
+    described.chain.orientation = "intrinsic_zyx";
+    const auto found = likely_orientation_mistake(described, with_orientations(seen, described.chain));
+    EXPECT_EQ(found.has_value(), count == 10);
+  }
 }
 
 TEST(LikelyMistake, TheUnitOfOneTargetIsNamed) {
