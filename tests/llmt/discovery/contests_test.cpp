@@ -321,6 +321,12 @@ TEST(Contests, EachAppliesToWhatItLeavesOut) {
   EXPECT_EQ(left_out_for(log, unknown, regimes), Searches{""});
   unknown.gaps[0].known_noise = noise;
   EXPECT_EQ(left_out_for(log, unknown, regimes), Searches{});
+
+  // A step is an offset in a regime: in its place all terms are tried that act beyond a threshold of its input.
+  unknown = log.answer({"step"});
+  EXPECT_EQ(left_out_for(log, unknown, regimes), Searches{"saturation regimes "});
+  unknown.answer = Answer::unknown;
+  EXPECT_EQ(left_out_for(log, unknown, regimes), (Searches{"saturation regimes ", "", "", ""}));
 }
 
 }  // namespace

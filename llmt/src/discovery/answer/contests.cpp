@@ -1,5 +1,7 @@
 #include "discovery/answer/contests.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -170,23 +172,48 @@ std::vector<Others> plain_regimes(const Missing& found, const Terms& terms, cons
 // "where x > c".
 std::string gate_of(const std::string& location) { return location.substr(location.find("where ")); }
 
-// All terms, beyond the thresholds that were found.
+// A threshold among those that were tried, and its neighbours, between which it is refined.
+std::vector<double> around(const std::vector<double>& tried, double threshold) {
+  const auto place = std::ranges::lower_bound(tried, threshold);
+  std::vector<double> all;
+  if (place != tried.begin()) all.push_back(*(place - 1));
+  all.push_back(threshold);
+  const auto next = std::ranges::upper_bound(tried, threshold);
+  if (next != tried.end()) all.push_back(*next);
+  return all;
+}
+
+// All terms, beyond the thresholds that were found. A step is an offset in a regime: where it stands for another term
+// its threshold is only near that one's, so others are tried too. A step of another input there may be the same step.
 std::vector<Others> same_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
-  std::map<std::string, std::set<double>> thresholds;
+  std::map<std::string, std::set<double>> of_regimes;
+  std::map<std::string, std::set<double>> of_steps;
   for (const FoundTerm& term : found.found) {
-    if (term.regime.empty()) continue;
-    thresholds[gate_of(term.location)].insert(term.constants(term.constants.size() - 1));
+    const double last = term.constants.size() > 0 ? term.constants(term.constants.size() - 1) : 0.0;
+    if (!term.regime.empty()) of_regimes[gate_of(term.location)].insert(last);
+    if (term.family != "step" || !term.regime.empty() || !leaves_something(found)) continue;
+    for (const char* sign : {">", "<="}) of_steps[fmt::format("where {} {} c", term.inputs.front(), sign)].insert(last);
   }
-  if (thresholds.empty()) return {};
+  if (of_regimes.empty() && of_steps.empty()) return {};
   Others others{terms, without(refuted, terms_of_regimes(terms))};
   for (std::size_t t = 0; t < terms.size(); ++t) {
     if (terms[t].regime.empty()) continue;
-    const auto own = thresholds.find(gate_of(terms[t].location));
-    if (own == thresholds.end()) {
-      others.left_out.insert(t);
+    std::vector<double>& tried = others.terms[t].constants.back().tried;
+    std::set<double> all;
+    const std::string gate = gate_of(terms[t].location);
+    if (const auto own = of_regimes.find(gate); own != of_regimes.end()) {
+      for (const double threshold : own->second) {
+        for (const double near : around(tried, threshold)) all.insert(near);
+      }
+    } else if (const auto step = of_steps.find(gate); step != of_steps.end() && terms[t].family != "step") {
+      constexpr std::size_t every = 3;  // thresholds are refined
+      for (std::size_t k = 0; k < tried.size(); k += every) all.insert(tried[k]);
+      all.insert(step->second.begin(), step->second.end());
     } else {
-      others.terms[t].constants.back().tried.assign(own->second.begin(), own->second.end());
+      others.left_out.insert(t);
+      continue;
     }
+    tried.assign(all.begin(), all.end());
   }
   return {others};
 }
@@ -206,6 +233,10 @@ double cost_of_choice(const Missing& answer, const Terms& terms) {
   return cost;
 }
 
+std::vector<Others> same_regimes_again(const Missing& found, const Terms& terms, const Left& refuted) {
+  return leaves_something(found) ? same_regimes(found, terms, refuted) : std::vector<Others>();
+}
+
 struct Contest {
   const char* name;
   OthersOf others;
@@ -218,13 +249,14 @@ bool any_answer(const Missing&) { return true; }
 bool names(const Missing& other) { return !other.found.empty() && is_certain(other); }
 
 // Regimes last, because they are tried where everything else leaves something.
-constexpr std::array<Contest, 7> contests = {{{"no states", states, any_answer},
+constexpr std::array<Contest, 8> contests = {{{"no states", states, any_answer},
                                               {"no terms", all, any_answer},
                                               {"no shapes", shapes, names},
                                               {"no such term", each_left_out, names},
                                               {"no searched constants", constants, any_answer},
                                               {"regimes", plain_regimes, any_answer},
-                                              {"terms of these regimes", same_regimes, any_answer}}};
+                                              {"terms of these regimes", same_regimes, any_answer},
+                                              {"terms of these again", same_regimes_again, any_answer}}};
 
 Missing winner(Missing found, Missing other, const Terms& terms, const CrossValidation& validation) {
   Eigen::VectorXd floors(std::ssize(found.gaps));

@@ -323,7 +323,7 @@ void fit_on_all_rows(const Simulation& simulation, const Recording& recording, c
   data.sigma = scatter(model, data, {start, {}, placed, {}});
   hold(model, data, start, placed);
   TermFit fit = fit_terms(model, data, start, placed);
-  if (retry_constants(model, data, fit)) fit = fit_terms(model, data, fit.parameters, fit.placed);
+  if (retry_constants(model, data, data, fit)) fit = fit_terms(model, data, fit.parameters, fit.placed);
   take_simpler(model, data, fit, missing);
   place_thresholds_at_rest(model, measured, rows.at_rest, fit);
   const TermFit alone = fit_terms(model, data, start, {});

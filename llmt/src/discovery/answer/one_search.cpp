@@ -75,7 +75,7 @@ Settled search_until_settled(const TermModel& model, TermData& data, const std::
     std::vector<PlacedTerm> found = found_terms(settled.question, settled.verdict);
     hold(model, kept, settled.fit.parameters, found);
     settled.fit = fit_terms(model, kept, settled.fit.parameters, found);
-    if (retry_constants(model, kept, settled.fit)) {
+    if (retry_constants(model, kept, data, settled.fit)) {
       settled.fit = fit_terms(model, kept, settled.fit.parameters, settled.fit.placed);
     }
     work.did(share_of_half_a_round * work.left());

@@ -191,6 +191,7 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
     options.resize(std::min(most, options.size()));
     for (PlacedTerm& option : options) {
       option.prior_cost += 2.0 * std::log(trials / static_cast<double>(options.size()));
+      refine_regime(model, data, ground, simulated, option);
       question.candidates.push_back(candidate_of(model, data, option, simulated, slots.next(model, option), noise));
       question.options.push_back(std::move(option));
     }
@@ -203,16 +204,18 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   return question;
 }
 
-bool retry_constants(const TermModel& model, const TermData& data, TermFit& fit) {
+bool retry_constants(const TermModel& model, const TermData& kept, const TermData& data, TermFit& fit) {
   bool changed = false;
   for (std::size_t t = 0; t < fit.placed.size(); ++t) {
     PlacedTerm& placed = fit.placed[t];
     if (placed.constants.size() == 0) continue;
     const TermConstant& constant = model.terms()[placed.term].constants.front();
     const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
-    const std::vector<PlacedTerm> best =
-        best_constants(model, data, ground_without(model, data, fit, t), placed.term, placed.output, simulated, {});
+    const TermData& own = model.terms()[placed.term].constants.back().smooth ? kept : data;
+    const TrialGround ground = ground_without(model, own, fit, t);
+    std::vector<PlacedTerm> best = best_constants(model, own, ground, placed.term, placed.output, simulated, {});
     if (best.empty()) continue;
+    refine_regime(model, own, ground, simulated, best.front());
     const double moved = std::abs(best.front().constants(0) - placed.constants(0));
     const double step = spacing(constant.tried, placed.constants(0));
     if (moved > (constant.smooth ? 2.0 * step : 0.0)) {

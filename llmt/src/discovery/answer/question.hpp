@@ -28,8 +28,9 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
                  const InputNoise* noise = nullptr);
 
 /// Moves constants of terms to a better value, if there is one now that everything else is fitted. Returns whether any
-/// was moved.
-bool retry_constants(const TermModel& model, const TermData& data, TermFit& fit);
+/// was moved. `kept`: without outliers. Samples between a threshold and where it should be look like outliers, so a
+/// threshold is placed on all samples, `data`.
+bool retry_constants(const TermModel& model, const TermData& kept, const TermData& data, TermFit& fit);
 
 /// Sets the errors of constants that are not smooth, see trial_error().
 void set_trial_errors(const TermModel& model, const TermData& data, TermFit& fit);

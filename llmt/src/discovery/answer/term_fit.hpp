@@ -75,6 +75,11 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
                                        std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
                                        const std::vector<PlacedTerm>& taken);
 
+/// Places the threshold of a term that acts in a regime and has another constant between the values that are tried,
+/// and fits both in turn; other terms stay as they are. best_constants() does the same for a threshold alone.
+void refine_regime(const TermModel& model, const TermData& data, const TrialGround& ground,
+                   const Eigen::MatrixXd& simulated, PlacedTerm& placed);
+
 /// Distance from a constant, of this number, to the next value tried at which the sum of squares is larger by more than
 /// the variance of what is left.
 double trial_error(const TermModel& model, const TermData& data, const TrialGround& ground, const PlacedTerm& placed,

@@ -43,6 +43,9 @@ class Trials {
     residuals_ -= basis_ * (basis_.transpose() * residuals_);
   }
 
+  /// From now on, as if nothing had been filtered.
+  void be_coarse() { is_coarse_ = true; }
+
   double gain(const Eigen::VectorXd& constants) {
     placed_.constants = constants;
     const bool is_coarse =
@@ -56,10 +59,10 @@ class Trials {
     return gain_of(columns);
   }
 
-  /// At all values tried, coarsely: as if nothing had been filtered.
+  /// At all values tried, coarsely.
   std::vector<double> coarse_gains(const std::vector<Eigen::VectorXd>& tried) {
     std::vector<double> gains;
-    is_coarse_ = true;
+    be_coarse();
     if (!data_->samples.is_filtered() || model_->shared() == nullptr ||
         !ColumnCache::holds_grid(model_->terms()[placed_.term])) {
       for (const Eigen::VectorXd& values : tried) gains.push_back(gain(values));
@@ -175,25 +178,29 @@ Eigen::VectorXd refined(Trials& trials, const std::vector<TermConstant>& constan
   return values;
 }
 
-// The best of the places between the neighbours of a threshold, which few were tried of. 0 costs no number: it stands
-// where another place gains less than a number of n rows costs, ln n of the mean square that is left.
-double refined_threshold(Trials& trials, const std::vector<double>& tried, double best, double gain, double n) {
+// The best of the places between the neighbours of a threshold, the last of the constants, which few were tried of. 0
+// costs no number: it stands where another place gains less than a number of n rows costs, ln n of the mean square that
+// is left.
+void refine_threshold(Trials& trials, const std::vector<double>& tried, Eigen::VectorXd& values, double gain,
+                      double n) {
   constexpr int places = 40;
-  const auto above = std::ranges::upper_bound(tried, best);
-  const auto below = std::ranges::lower_bound(tried, best);
-  const double low = below == tried.begin() ? best : *(below - 1);
-  const double high = above == tried.end() ? best : *above;
+  double& threshold = values(values.size() - 1);
+  const auto above = std::ranges::upper_bound(tried, threshold);
+  const auto below = std::ranges::lower_bound(tried, threshold);
+  const double low = below == tried.begin() ? threshold : *(below - 1);
+  const double high = above == tried.end() ? threshold : *above;
+  double best = threshold;
   for (int k = 1; k < places; ++k) {
-    const double trial = low + (high - low) * k / places;
-    const double own = trials.gain(Eigen::VectorXd::Constant(1, trial));
+    threshold = low + (high - low) * k / places;
+    const double own = trials.gain(values);
     if (!(own > gain)) continue;
     gain = own;
-    best = trial;
+    best = threshold;
   }
-  if (!(tried.front() < 0.0 && 0.0 < tried.back())) return best;
-  const double at_zero = trials.gain(Eigen::VectorXd::Zero(1));
+  threshold = 0.0;
+  const bool has_zero = tried.front() < 0.0 && 0.0 < tried.back();
   const double left = std::max(0.0, trials.sum_of_squares() - gain);
-  return gain - at_zero < left * std::log(n) / n ? 0.0 : best;
+  if (!has_zero || !(gain - trials.gain(values) < left * std::log(n) / n)) threshold = best;
 }
 
 }  // namespace
@@ -257,13 +264,26 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
     if (constant.smooth && !ColumnCache::is_state_of_inputs(own)) {
       constants = refined(trials, own.constants, constants, gains[k]);
     } else if (!constant.smooth && own.constants.size() == 1 && constant.tried.size() > 1) {
-      constants(0) =
-          refined_threshold(trials, constant.tried, constants(0), gains[k], static_cast<double>(data.samples.size()));
+      refine_threshold(trials, constant.tried, constants, gains[k], static_cast<double>(data.samples.size()));
     }
     best.push_back(trials.at(constants));
     best.back().explained = gains[k];
   }
   return best;
+}
+
+void refine_regime(const TermModel& model, const TermData& data, const TrialGround& ground,
+                   const Eigen::MatrixXd& simulated, PlacedTerm& placed) {
+  const ModelTerm& own = model.terms()[placed.term];
+  if (own.regime.empty() || own.constants.size() < 2) return;
+  Trials trials(model, data, ground, placed, simulated);
+  trials.be_coarse();
+  constexpr int sweeps = 2;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    refine_threshold(trials, own.constants.back().tried, placed.constants, trials.gain(placed.constants),
+                     static_cast<double>(data.samples.size()));
+    placed.constants = refined(trials, own.constants, placed.constants, trials.gain(placed.constants));
+  }
 }
 
 }  // namespace llmt::discovery

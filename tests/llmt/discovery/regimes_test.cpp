@@ -1,0 +1,107 @@
+// Effects that act beyond a threshold alone.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "discovery/answer/question.hpp"
+#include "discovery/answer/term_fit.hpp"
+#include "discovery/recording/row_split.hpp"
+#include "llmt/discovery/missing.hpp"
+#include "llmt/discovery/simulation.hpp"
+#include "llmt/discovery/terms.hpp"
+#include "noise.hpp"
+
+namespace regimes_test {
+namespace {
+
+using namespace llmt::discovery;
+
+constexpr Eigen::Index rows = 800;
+constexpr double threshold = 0.4321;
+
+// A level h, a temperature T and a speed v; y = what acts at h > threshold.
+Missing missing_from(double (*effect)(double temperature, double speed)) {
+  Inputs inputs{{"h", "T", "v"}, Eigen::MatrixXd(rows, 3)};
+  inputs.instants = Eigen::VectorXd::LinSpaced(rows, 0.0, 0.04 * (rows - 1));
+  inputs.noise = Eigen::VectorXd::Zero(3);
+  MeasuredOutputs measured{{"y"}, Eigen::MatrixXd(rows, 1)};
+  measured.noise = Eigen::VectorXd::Constant(1, 0.02);
+  Noise random(7);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const double t = inputs.instants(i);
+    const double h = std::sin(0.83 * t) + 0.3 * std::sin(2.9 * t + 1.0);
+    const double temperature = 25.0 + 8.0 * std::sin(1.37 * t) + 3.0 * std::sin(3.3 * t);
+    const double speed = std::sin(2.1 * t) + 0.6 * std::sin(5.3 * t + 0.4);
+    inputs.values.row(i) << h, temperature, speed;
+    measured.values(i, 0) = (h > threshold ? effect(temperature, speed) : 0.0) + 0.02 * random.normal();
+  }
+  std::vector<ModelTerm> terms = standard_terms(inputs);
+  for (ModelTerm& term : regime_terms(inputs, terms)) terms.push_back(std::move(term));
+  return find_missing(tabulated(Eigen::MatrixXd::Zero(rows, 1), {"y"}), inputs, measured, terms, {});
+}
+
+// A search finds a step of h first: what acts there hardly changes its size.
+TEST(Regimes, ALawIsNamedInThePlaceOfAStep) {
+  const Missing missing =
+      missing_from([](double temperature, double) { return 9.0 * temperature / (9.0 + temperature); });
+  ASSERT_EQ(missing.found.size(), 1U);
+  const FoundTerm& found = missing.found[0];
+  EXPECT_EQ(found.family, "saturation");
+  EXPECT_EQ(found.location, "T where h > c");
+  EXPECT_NEAR(found.coefficients(0), 9.0, 0.5);
+  EXPECT_NEAR(found.constants(1), threshold, 0.02);
+}
+
+// Its constant and its threshold, which stands between those that are tried, are fitted in turn.
+TEST(Regimes, AConstantAndAThresholdAreFittedTogether) {
+  const Missing missing = missing_from([](double, double speed) { return 2.0 * std::tanh(speed / 0.3); });
+  ASSERT_EQ(missing.found.size(), 1U);
+  const FoundTerm& found = missing.found[0];
+  EXPECT_EQ(found.family, "tanh");
+  EXPECT_EQ(found.location, "v where h > c");
+  EXPECT_TRUE(found.confirmed);
+  EXPECT_NEAR(found.coefficients(0), 2.0, 0.02);
+  EXPECT_NEAR(found.constants(0), 0.3, 0.01);
+  EXPECT_NEAR(found.constants(1), threshold, 0.01);
+}
+
+// The samples between a threshold and its true place are far off, and were taken for outliers.
+TEST(Regimes, AThresholdIsPlacedOnAllSamples) {
+  constexpr Eigen::Index n = 200;
+  Inputs inputs{{"x"}, Eigen::VectorXd::LinSpaced(n, 0.0, 1.0)};
+  inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, 1.0);
+  const Eigen::MatrixXd y = (inputs.values.array() > 0.61).cast<double>();
+  const std::vector<ModelTerm> terms = standard_terms(inputs);
+  const Simulation simulation = tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"});
+  const Recording recording(inputs);
+  const TermModel model(simulation, recording, {"y"}, terms);
+  const RowSplit split = split_of_all(recording, {.apart = {}, .fewest_samples = n}, {});
+  ASSERT_EQ(split.searched.size(), n);
+  const TermData data{.samples = split.searched,
+                      .measured = means(y, split.searched),
+                      .sigma = Eigen::VectorXd::Ones(1),
+                      .stretches = split.stretches};
+  std::vector<std::size_t> between;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (inputs.values(i) > 0.5 && inputs.values(i) <= 0.61) between.push_back(static_cast<std::size_t>(i));
+  }
+  TermFit fit;
+  fit.parameters = values_of(simulation.parameters);
+  fit.placed.push_back(
+      {.term = static_cast<std::size_t>(std::ranges::find(terms, "step", &ModelTerm::family) - terms.begin()),
+       .output = 0,
+       .constants = Eigen::VectorXd::Constant(1, 0.5),
+       .coefficients = Eigen::VectorXd::Ones(1)});
+  const TermData kept = without_samples(data, between);
+  TermFit without = fit;
+  retry_constants(model, kept, kept, without);
+  EXPECT_GT(std::abs(without.placed[0].constants(0) - 0.61), 0.005);
+  EXPECT_TRUE(retry_constants(model, kept, data, fit));
+  EXPECT_NEAR(fit.placed[0].constants(0), 0.61, 0.005);
+}
+
+}  // namespace
+}  // namespace regimes_test
