@@ -43,8 +43,8 @@ Missing missing_from(double (*effect)(double temperature, double speed)) {
   return find_missing(tabulated(Eigen::MatrixXd::Zero(rows, 1), {"y"}), inputs, measured, terms, {});
 }
 
-// A search finds a step of h first: what acts there hardly changes its size.
-TEST(Regimes, ALawIsNamedInThePlaceOfAStep) {
+// What acts there hardly changes its size, as a step would.
+TEST(Regimes, ALawThatIsNearlyAStepIsNamed) {
   const Missing missing =
       missing_from([](double temperature, double) { return 9.0 * temperature / (9.0 + temperature); });
   ASSERT_EQ(missing.found.size(), 1U);
