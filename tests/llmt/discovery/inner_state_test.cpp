@@ -232,14 +232,21 @@ TEST(InnerState, ACorrectionThatMakesTheGapLargerIsWorse) {
     better.answer = answer;
     EXPECT_EQ(may_be_applied(better), answer != Answer::nothing_missing);
   }
-  // Parameters beside something unknown must take away more than they leave: half of the squares.
+  // What is not confirmed must take away more than it leaves: half of the squares.
   for (const double after : {0.7, 0.72}) {
     better.gaps[0].after = after;
     better.gaps[0].before = 0.9;
-    better.answer = Answer::undecided;
-    EXPECT_EQ(may_be_applied(better), after < 0.71);
-    better.answer = Answer::unknown;
-    EXPECT_TRUE(may_be_applied(better));
+    for (const Answer answer : {Answer::undecided, Answer::unknown, Answer::indistinguishable, Answer::inner_state}) {
+      better.answer = answer;
+      better.found.front().confirmed = false;
+      EXPECT_EQ(may_be_applied(better), after < 0.71);
+      // An output that nothing is added to says nothing of it.
+      better.gaps.push_back({.output = "other", .before = 1.0, .after = 1.0, .nominal = 1.0});
+      EXPECT_EQ(may_be_applied(better), after < 0.71);
+      better.gaps.pop_back();
+      better.found.front().confirmed = answer != Answer::undecided;
+      EXPECT_EQ(may_be_applied(better), after < 0.71 || answer != Answer::undecided);
+    }
   }
   Missing worse = missing_with({{0.5, 0.6}});
   worse.answer = Answer::named;

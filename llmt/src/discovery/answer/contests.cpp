@@ -19,6 +19,9 @@ namespace {
 using Terms = std::vector<ModelTerm>;
 using Left = std::set<std::size_t>;
 
+// What is left counts as noise up to this times the known noise: it is known to about a fifth.
+constexpr double as_noise = 1.2;
+
 bool is_certain(const Missing& missing) {
   if (missing.found.empty()) return missing.answer != Answer::unknown && missing.answer != Answer::undecided;
   return std::ranges::all_of(missing.found, &FoundTerm::confirmed);
@@ -169,9 +172,6 @@ std::vector<Others> plain_regimes(const Missing& found, const Terms& terms, cons
            })}};
 }
 
-// "where x > c".
-std::string gate_of(const std::string& location) { return location.substr(location.find("where ")); }
-
 // A threshold among those that were tried, and its neighbours, between which it is refined.
 std::vector<double> around(const std::vector<double>& tried, double threshold) {
   const auto place = std::ranges::lower_bound(tried, threshold);
@@ -228,7 +228,8 @@ double cost_of_choice(const Missing& answer, const Terms& terms) {
   for (const FoundTerm& found : answer.found) {
     const ModelTerm& term = terms[found.term];
     cost += std::log(term.regime.empty() ? of_others : of_regimes);
-    for (const TermConstant& constant : term.constants) cost += std::log(std::max<double>(1.0, constant.tried.size()));
+    for (const TermConstant& constant : term.constants)
+      cost += std::log(std::max(1.0, static_cast<double>(constant.tried.size())));
   }
   return cost;
 }
@@ -277,8 +278,21 @@ std::set<std::size_t> terms_of_regimes(const Terms& terms) {
   return with({}, terms, [](const ModelTerm& term) { return !term.regime.empty(); });
 }
 
+std::string gate_of(const std::string& location) {
+  const std::size_t place = location.find("where ");
+  return place == std::string::npos ? std::string() : location.substr(place);
+}
+
+bool is_within_noise(const Missing& missing) {
+  constexpr double contradicted = 0.5;
+  const bool may_be_asked = missing.answer == Answer::unknown || !missing.found.empty();
+  return may_be_asked && std::ranges::all_of(missing.gaps, [](const Gap& gap) {
+           return gap.before >= contradicted * gap.known_noise && gap.before <= as_noise * gap.known_noise &&
+                  gap.before <= as_noise * gap.noise_floor;
+         });
+}
+
 bool leaves_something(const Missing& missing) {
-  constexpr double as_noise = 1.2;
   const auto is_noise = [&](const Gap& gap) {
     return std::max(gap.after, gap.noise_floor) <= as_noise * gap.known_noise;
   };

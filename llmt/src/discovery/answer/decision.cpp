@@ -232,19 +232,22 @@ bool is_worse(const Missing& missing) {
 }
 
 bool may_be_applied(const Missing& missing) {
-  const auto outputs = static_cast<double>(missing.gaps.size());
+  double outputs = 0.0;
   double left = 0.0;
-  for (const Gap& gap : missing.gaps) left += gap.nominal > 0.0 ? std::pow(gap.after / gap.nominal, 2.0) : 1.0;
+  for (const Gap& gap : missing.gaps) {
+    if (gap.after == gap.nominal) continue;
+    left += gap.nominal > 0.0 ? std::pow(gap.after / gap.nominal, 2.0) : 1.0;
+    outputs += 1.0;
+  }
+  const bool is_confirmed = std::ranges::any_of(missing.found, &FoundTerm::confirmed);
   switch (missing.answer) {
     case Answer::nothing_missing:
     case Answer::failed_held_out:
       return false;
     case Answer::parameters_only:  // nothing was added, so the simulation as it was given is what counts
       return left <= outputs;
-    case Answer::undecided:  // parameters may stand for what is missing
-      return 2.0 * left <= outputs;
-    default:
-      return !is_worse(missing);
+    default:  // what is not confirmed may stand for something else
+      return !is_worse(missing) && (is_confirmed || !(2.0 * left > outputs));
   }
 }
 

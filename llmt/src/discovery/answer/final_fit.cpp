@@ -61,8 +61,27 @@ class Ground {
   Eigen::VectorXd residuals_;
 };
 
-bool may_stand_for_another(const ModelTerm& term) {
-  return !term.generic && !term.history && !term.whole && term.inner_state.empty() && term.regime.empty();
+bool may_have_another(const ModelTerm& term) {
+  return !term.generic && !term.history && !term.whole && term.inner_state.empty();
+}
+
+// Of terms that act in a regime only those of the same one are rivals, beyond the same threshold.
+bool may_stand_for(const ModelTerm& other, const ModelTerm& term) {
+  return may_have_another(other) && other.regime == term.regime && gate_of(other.location) == gate_of(term.location);
+}
+
+// The term at the constants that explain most in the place of one that was found.
+std::vector<PlacedTerm> options_of(const TermModel& model, const TermData& data, const TrialGround& ground,
+                                   std::size_t term, const PlacedTerm& found, const Eigen::MatrixXd& simulated) {
+  const ModelTerm& own = model.terms()[term];
+  const bool is_everywhere = own.regime.empty();
+  const Eigen::Index last = found.constants.size() - 1;
+  if (std::ssize(own.constants) > (is_everywhere ? 0 : 1)) {
+    const std::optional<double> threshold = is_everywhere ? std::nullopt : std::optional<double>(found.constants(last));
+    return best_constants(model, data, ground, term, found.output, simulated, {}, threshold);
+  }
+  const Eigen::VectorXd constants = is_everywhere ? Eigen::VectorXd() : found.constants.tail(1);
+  return {{term, found.output, constants, Eigen::VectorXd::Zero(std::ssize(own.coefficients)), 0.0}};
 }
 
 std::string name_of(const ModelTerm& term) {
@@ -104,7 +123,7 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
   const double samples = data.independent_share * static_cast<double>(data.samples.size());
   for (std::size_t k = 0; k < fit.placed.size(); ++k) {
     const ModelTerm& own_term = model.terms()[fit.placed[k].term];
-    if (!may_stand_for_another(own_term)) continue;
+    if (!may_have_another(own_term)) continue;
     const Ground place(ground_without(model, data, fit, k));
     const InPlace own = place.with(model, data, fit.placed[k], simulated);
     FoundTerm& found = missing.found[k];
@@ -114,15 +133,9 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
     std::optional<InPlace> differing;
     for (std::size_t t = 0; t < model.terms().size(); ++t) {
       const ModelTerm& term = model.terms()[t];
-      if (t == fit.placed[k].term || !may_stand_for_another(term)) continue;
+      if (t == fit.placed[k].term || !may_stand_for(term, own_term)) continue;
       if (!term.output.empty() && term.output != model.outputs()[output]) continue;
-      std::vector<PlacedTerm> options;
-      if (term.constants.empty()) {
-        options.push_back({t, output, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0});
-      } else {
-        options = best_constants(model, data, place.ground(), t, output, simulated, {});
-      }
-      for (PlacedTerm& option : options) {
+      for (PlacedTerm& option : options_of(model, data, place.ground(), t, fit.placed[k], simulated)) {
         const InPlace other = place.with(model, data, std::move(option), simulated);
         const double evidence =
             0.5 * samples * std::log(other.left / own.left) + 0.5 * (other.numbers - own.numbers) * std::log(samples);
@@ -156,7 +169,7 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
 namespace {
 
 bool is_simpler_at_the_same_inputs(const ModelTerm& term, const ModelTerm& than) {
-  return may_stand_for_another(term) && std::ranges::is_permutation(term.inputs, than.inputs) &&
+  return may_stand_for(term, than) && std::ranges::is_permutation(term.inputs, than.inputs) &&
          term.output == than.output &&
          term.coefficients.size() + term.constants.size() < than.coefficients.size() + than.constants.size();
 }
@@ -174,7 +187,7 @@ void take_simpler(const TermModel& model, const TermData& data, TermFit& fit, Mi
   for (std::size_t k = 0; k < fit.placed.size(); ++k) {
     const PlacedTerm placed = fit.placed[k];
     const ModelTerm& own_term = model.terms()[placed.term];
-    if (!may_stand_for_another(own_term)) continue;
+    if (!may_have_another(own_term)) continue;
     std::optional<Ground> place;
     std::optional<TermFit> best;
     double least = 0.0;
@@ -185,10 +198,7 @@ void take_simpler(const TermModel& model, const TermData& data, TermFit& fit, Mi
       const InPlace own = place->with(model, data, placed, simulated);
       PlacedTerm at_own{t, placed.output, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0};
       if (term.constants.size() == own_term.constants.size()) at_own.constants = placed.constants;
-      std::vector<PlacedTerm> options;
-      if (!term.constants.empty()) {
-        options = best_constants(model, data, place->ground(), t, placed.output, simulated, {});
-      }
+      std::vector<PlacedTerm> options = options_of(model, data, place->ground(), t, placed, simulated);
       if (at_own.constants.size() == std::ssize(term.constants)) options.push_back(std::move(at_own));
       for (PlacedTerm& option : options) {
         const InPlace other = place->with(model, data, option, simulated);

@@ -209,16 +209,18 @@ bool retry_constants(const TermModel& model, const TermData& kept, const TermDat
   for (std::size_t t = 0; t < fit.placed.size(); ++t) {
     PlacedTerm& placed = fit.placed[t];
     if (placed.constants.size() == 0) continue;
-    const TermConstant& constant = model.terms()[placed.term].constants.front();
+    const std::vector<TermConstant>& constants = model.terms()[placed.term].constants;
     const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
-    const TermData& own = model.terms()[placed.term].constants.back().smooth ? kept : data;
+    const TermData& own = constants.back().smooth ? kept : data;
     const TrialGround ground = ground_without(model, own, fit, t);
     std::vector<PlacedTerm> best = best_constants(model, own, ground, placed.term, placed.output, simulated, {});
     if (best.empty()) continue;
     refine_regime(model, own, ground, simulated, best.front());
-    const double moved = std::abs(best.front().constants(0) - placed.constants(0));
-    const double step = spacing(constant.tried, placed.constants(0));
-    if (moved > (constant.smooth ? 2.0 * step : 0.0)) {
+    const Eigen::VectorXd values = placed.constants;
+    for (Eigen::Index c = 0; c < values.size(); ++c) {
+      const double moved = std::abs(best.front().constants(c) - values(c));
+      const double step = constants[c].smooth ? spacing(constants[c].tried, values(c)) : 0.0;
+      if (!(moved > 2.0 * step)) continue;
       placed.constants = best.front().constants;
       changed = true;
     }

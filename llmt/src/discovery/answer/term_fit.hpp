@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "discovery/recording/samples.hpp"
@@ -70,10 +71,10 @@ struct TrialGround {
 };
 
 /// The best constants of a term on one output, each with the prior cost of its choice; constants within two steps of
-/// those in `taken` do not count.
+/// those in `taken` do not count. `threshold`: that of a term that acts in a regime, held.
 std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& data, const TrialGround& ground,
                                        std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
-                                       const std::vector<PlacedTerm>& taken);
+                                       const std::vector<PlacedTerm>& taken, std::optional<double> threshold = {});
 
 /// Places the threshold of a term that acts in a regime and has another constant between the values that are tried,
 /// and fits both in turn; other terms stay as they are. best_constants() does the same for a threshold alone.

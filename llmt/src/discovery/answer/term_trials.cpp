@@ -140,13 +140,14 @@ class Trials {
   }
 };
 
-// Every value of the first constant with every value of the second.
-std::vector<Eigen::VectorXd> combinations(const std::vector<TermConstant>& constants) {
+// Every value of the first constant with every value of the second, or with the one at which that is held.
+std::vector<Eigen::VectorXd> combinations(const std::vector<TermConstant>& constants, std::optional<double> held) {
   std::vector<Eigen::VectorXd> all;
   for (const double first : constants.front().tried) {
     if (constants.size() == 1) all.push_back(Eigen::VectorXd::Constant(1, first));
     if (constants.size() == 1) continue;
-    for (const double second : constants[1].tried) all.push_back(Eigen::Vector2d(first, second));
+    for (const double second : held ? std::vector<double>{*held} : constants[1].tried)
+      all.push_back(Eigen::Vector2d(first, second));
   }
   return all;
 }
@@ -231,10 +232,10 @@ double trial_error(const TermModel& model, const TermData& data, const TrialGrou
 
 std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& data, const TrialGround& ground,
                                        std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
-                                       const std::vector<PlacedTerm>& taken) {
+                                       const std::vector<PlacedTerm>& taken, std::optional<double> threshold) {
   const ModelTerm& own = model.terms()[term];
   const TermConstant& constant = own.constants.front();
-  const std::vector<Eigen::VectorXd> tried = combinations(own.constants);
+  const std::vector<Eigen::VectorXd> tried = combinations(own.constants, threshold);
   PlacedTerm placed{.term = term,
                     .output = output,
                     .constants = {},
