@@ -68,6 +68,17 @@ TEST(Regimes, AConstantAndAThresholdAreFittedTogether) {
   EXPECT_NEAR(found.constants(1), threshold, 0.01);
 }
 
+// Which of the laws that are the same function there acts, no row can tell.
+TEST(Regimes, LawsBeyondOneThresholdAreRivals) {
+  const Missing missing = missing_from([](double, double speed) { return std::asinh(speed / 2.0); });
+  ASSERT_EQ(missing.found.size(), 1U);
+  const FoundTerm& found = missing.found[0];
+  const std::string law = "asinh v where h > c";
+  const bool is_named = found.family + " " + found.location == law;
+  EXPECT_TRUE(is_named || std::ranges::find(found.rivals, law, &RivalTerms::what) != found.rivals.end());
+  EXPECT_NEAR(found.constants(found.constants.size() - 1), threshold, 0.03);
+}
+
 // The samples between a threshold and its true place are far off, and were taken for outliers.
 TEST(Regimes, AThresholdIsPlacedOnAllSamples) {
   constexpr Eigen::Index n = 200;
@@ -101,6 +112,41 @@ TEST(Regimes, AThresholdIsPlacedOnAllSamples) {
   EXPECT_GT(std::abs(without.placed[0].constants(0) - 0.61), 0.005);
   EXPECT_TRUE(retry_constants(model, kept, data, fit));
   EXPECT_NEAR(fit.placed[0].constants(0), 0.61, 0.005);
+}
+
+// A threshold beside a constant that stays.
+TEST(Regimes, AThresholdBesideAConstantIsPlacedAgain) {
+  constexpr Eigen::Index n = 200;
+  Inputs inputs{{"x", "v"}, Eigen::MatrixXd(n, 2)};
+  inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, 1.0);
+  Eigen::MatrixXd y(n, 1);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double t = inputs.instants(i);
+    inputs.values.row(i) << t, std::sin(50.0 * t);
+    y(i, 0) = t > 0.61 ? std::tanh(inputs.values(i, 1) / 0.3) : 0.0;
+  }
+  std::vector<ModelTerm> terms = standard_terms(inputs);
+  for (ModelTerm& term : regime_terms(inputs, terms)) terms.push_back(std::move(term));
+  const auto is_wanted = [](const ModelTerm& term) {
+    return term.family == "tanh" && term.location == "v where x > c";
+  };
+  const Simulation simulation = tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"});
+  const Recording recording(inputs);
+  const TermModel model(simulation, recording, {"y"}, terms);
+  const RowSplit split = split_of_all(recording, {.apart = {}, .fewest_samples = n}, {});
+  const TermData data{.samples = split.searched,
+                      .measured = means(y, split.searched),
+                      .sigma = Eigen::VectorXd::Ones(1),
+                      .stretches = split.stretches};
+  TermFit fit;
+  fit.parameters = values_of(simulation.parameters);
+  fit.placed.push_back({.term = static_cast<std::size_t>(std::ranges::find_if(terms, is_wanted) - terms.begin()),
+                        .output = 0,
+                        .constants = Eigen::Vector2d(0.3, 0.5),
+                        .coefficients = Eigen::VectorXd::Ones(1)});
+  EXPECT_TRUE(retry_constants(model, data, data, fit));
+  EXPECT_NEAR(fit.placed[0].constants(0), 0.3, 0.03);
+  EXPECT_NEAR(fit.placed[0].constants(1), 0.61, 0.01);
 }
 
 }  // namespace
