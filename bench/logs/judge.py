@@ -33,6 +33,7 @@ def arguments():
     parser.add_argument("--options", default="", help="further options of discover, separated by blanks")
     parser.add_argument("--tell-noise", action="store_true", help="hand the noise that signals reports to --input-noise")
     parser.add_argument("--through-filter", action="store_true", help="the user filters the simulation as the log was")
+    parser.add_argument("--calibrated", action="store_true", help="the user fitted the parameters to the log before")
     parser.add_argument("--limit", type=int, default=300, metavar="SECONDS", help="CPU time of a search; default: %(default)s")
     parser.add_argument("--list", default="", metavar="KIND,...", help="print a line for each run of these kinds, or all")
     options = parser.parse_args()
@@ -83,6 +84,7 @@ def structure_of(case, rows):
 def run(options, seed, folder):
     case = generate.case(seed)
     walked = way.walk(options.program, case, folder, options)
+    case = walked.case
     result = {"seed": seed, "kind": case.kind, "truth": truth_text(case), "seconds": walked.seconds}
     result["rows"] = [len(rows.at) if rows else 0 for rows in walked.rows]
     first = walked.rows[0] or way.whole(case, 1)

@@ -31,6 +31,7 @@ class Rows:
 
 @dataclasses.dataclass
 class Walk:
+    case: object  # that the answer is of
     answer: dict | None
     message: str  # of the program, where it gave no answer
     seconds: dict  # CPU time of signals, discover
@@ -157,21 +158,46 @@ def true_rows(case, rows):
     return s | {"t": rows.table["t"]}, *nominal(case, s)
 
 
+def fit_of_parameters(case, rows):
+    """Least squares of the free parameters' changes to the gap of rows, no effect beside them."""
+    matrix = np.column_stack([rows.derivatives[name] for name in case.free])
+    return [float(x) for x in np.linalg.lstsq(matrix, rows.table["u"] - rows.simulated, rcond=None)[0]]
+
+
+def calibrated(case, first, second):
+    """The case of a user who fitted the free parameters to the first run before, whatever is hidden there. A complete
+    machine then has parameters that are off, by what errors of the signals do to such a fit."""
+    moved = dict(zip(case.free, fit_of_parameters(case, first)))
+    nominal = {name: value + moved.get(name, 0.0) for name, value in case.machine.parameters.items()}
+    changes = {name: case.hidden.changes.get(name, 0.0) - change for name, change in moved.items()}
+    case = dataclasses.replace(
+        case,
+        kind="parameters" if case.kind == "complete" else case.kind,
+        machine=dataclasses.replace(case.machine, parameters=nominal),
+        hidden=dataclasses.replace(case.hidden, changes=changes),
+    )
+    for rows in (first, second):
+        rows.simulated = rows.simulated + sum(change * rows.derivatives[name] for name, change in moved.items())
+    return case
+
+
 def walk(program, case, folder, options):
     first, message, spent = signals(program, case, 1, folder, options.through_filter)
     second, other, more = signals(program, case, 2, folder, options.through_filter)
     seconds = {"signals": spent + more}
     if first is None or second is None:
-        return Walk(None, "signals: " + (message or other), seconds, (first, second), None, None, None)
+        return Walk(case, None, "signals: " + (message or other), seconds, (first, second), None, None, None)
+    if options.calibrated and case.free:
+        case = calibrated(case, first, second)
     answer, message, seconds["discover"] = discover(program, case, first, folder, options)
     columns, exact, derivatives = true_rows(case, second)
     missing = hidden_at(case, second, columns, exact)
     if answer is None:
-        return Walk(None, message, seconds, (first, second), None, missing, None)
+        return Walk(case, None, message, seconds, (first, second), None, missing, None)
     by_answer, message = apply(program, case, columns, exact, derivatives, folder)
     corrected, _ = apply(program, case, second.table, second.simulated, second.derivatives, folder)
     added = by_answer - exact if by_answer is not None else None
-    return Walk(answer, message, seconds, (first, second), added, missing, corrected)
+    return Walk(case, answer, message, seconds, (first, second), added, missing, corrected)
 
 
 def parameter_part(case, signals):
@@ -185,9 +211,12 @@ def by_past(case):
 
 
 def hidden_at(case, rows, signals, simulated):
-    """The true missing part at rows: a function of the signals given, or of the past of the true run."""
+    """The true missing part at rows: a function of the signals given, or of the past of the true run.
+
+    Beside what depends on the past no parameter is off, but for what a calibration has moved.
+    """
     if by_past(case):
-        return rows.run.missing[rows.at]
+        return rows.run.missing[rows.at] + parameter_part(case, signals)
     return case.hidden.force(signals, simulated) + parameter_part(case, signals)
 
 
@@ -201,9 +230,7 @@ def rests(case, walk):
     gap = second.table["u"] - second.simulated
     alone = gap
     if case.free:
-        matrix = np.column_stack([first.derivatives[name] for name in case.free])
-        change = np.linalg.lstsq(matrix, first.table["u"] - first.simulated, rcond=None)[0]
-        alone = gap - np.column_stack([second.derivatives[name] for name in case.free]) @ change
+        alone = gap - np.column_stack([second.derivatives[name] for name in case.free]) @ fit_of_parameters(case, first)
     return rms(gap), rms(alone), rms(gap - hidden_at(case, second, second.table, second.simulated))
 
 

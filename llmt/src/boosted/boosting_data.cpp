@@ -13,6 +13,8 @@
 #include <utility>
 
 #include "base/count.hpp"
+#include "base/memory.hpp"
+#include "boosted/memory.hpp"
 #include "boosted/model/boosted_checks.hpp"
 #include "boosted/packed_sums.hpp"
 #include "data/column_order.hpp"
@@ -256,6 +258,10 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
   result.rows.equal_weights = (result.rows.weights.array() == 1.0).all();
   describe_columns(data, given, result);
   if (few) return result;  // nothing can be held out
+  Eigen::Index levels = 0;
+  for (int j = 0; j < std::ssize(result.inputs); ++j) levels += std::ssize(levels_with_features(result, j));
+  refuse_beyond_memory(SumSize{.rows = count, .inputs = result.x.cols(), .outputs = result.y.cols(), .levels = levels},
+                       machine_memory());
   const Eigen::Index turns = result.regime.takes_turns ? num_parts_of(result.regime, count) : 1;
   for (int part = 0; part < turns; ++part) result.hold_outs.push_back(part_apart(result.parts, part));
   for (int j = 0; j < std::ssize(result.inputs); ++j) {

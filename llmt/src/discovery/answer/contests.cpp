@@ -19,9 +19,6 @@ namespace {
 using Terms = std::vector<ModelTerm>;
 using Left = std::set<std::size_t>;
 
-// What is left counts as noise up to this times the known noise: it is known to about a fifth.
-constexpr double as_noise = 1.2;
-
 bool is_certain(const Missing& missing) {
   if (missing.found.empty()) return missing.answer != Answer::unknown && missing.answer != Answer::undecided;
   return std::ranges::all_of(missing.found, &FoundTerm::confirmed);
@@ -283,16 +280,8 @@ std::string gate_of(const std::string& location) {
   return place == std::string::npos ? std::string() : location.substr(place);
 }
 
-bool is_within_noise(const Missing& missing) {
-  constexpr double contradicted = 0.5;
-  const bool may_be_asked = missing.answer == Answer::unknown || !missing.found.empty();
-  return may_be_asked && std::ranges::all_of(missing.gaps, [](const Gap& gap) {
-           return gap.before >= contradicted * gap.known_noise && gap.before <= as_noise * gap.known_noise &&
-                  gap.before <= as_noise * gap.noise_floor;
-         });
-}
-
 bool leaves_something(const Missing& missing) {
+  constexpr double as_noise = 1.2;
   const auto is_noise = [&](const Gap& gap) {
     return std::max(gap.after, gap.noise_floor) <= as_noise * gap.known_noise;
   };

@@ -57,11 +57,6 @@ struct Advantage {
 Advantage advantage(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
                     double independent_share);
 
-/// Whether the gap is no more than its noise, as far as that is known, and what was found in it takes no more off than
-/// the noise is known to. `before`, `floor`, `known` of Gap: known / 2 <= before <= 1.2 known, before <= 1.2 floor. Far
-/// below the known noise that is none.
-bool is_within_noise(const Missing& missing);
-
 /// Whether something is left that no term without a regime explains: more than 1.2 times the noise, as far as that is
 /// known, on the rows searched or set aside, and the answer says so, or what is left is alike in neighbouring rows.
 bool leaves_something(const Missing& missing);

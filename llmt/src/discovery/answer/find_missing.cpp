@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -144,31 +143,6 @@ Beginning begin(const Simulation& simulation, const Recording& recording, const 
   return now;
 }
 
-// The answer without terms, where they explain no more than the noise is known to. `none`: of a search without any.
-Missing taken_back(const Missing& found, Missing none) {
-  std::vector<std::string> names;
-  for (const FoundTerm& term : found.found) {
-    names.push_back(term.location.empty() ? term.family : term.family + " " + term.location);
-  }
-  for (const Structure& structure : found.structure) {
-    names.push_back(fmt::format("something that depends on {}", fmt::join(structure.inputs, " and ")));
-  }
-  const Gap& gap = found.gaps.front();
-  none.notes = found.notes;
-  none.notes.push_back(
-      fmt::format("{0} {1} found and taken back: without {2} the gap of {3} is {4:.2g} times its known noise ({5:.2g})",
-                  fmt::join(names, ", "), names.size() == 1 ? "was" : "were", names.size() == 1 ? "it" : "them",
-                  gap.output, gap.before / gap.known_noise, gap.known_noise));
-  none.visible = found.visible;
-  none.not_testable = found.not_testable;
-  none.candidates = found.candidates;
-  none.rounds = found.rounds;
-  none.structure.clear();
-  if (none.verdict.answer == Answer::unknown) none.verdict.answer = Answer::nothing_missing;
-  decide(none);
-  return none;
-}
-
 // The search sees inputs without most of their errors. The answer is of the rows as they were given.
 Missing find(const Simulation& simulation, const Recording& as_given, const MeasuredOutputs& measured,
              const std::vector<ModelTerm>& terms, MissingOptions options) {
@@ -213,11 +187,6 @@ Missing find(const Simulation& simulation, const Recording& as_given, const Meas
       return search_once(there, recording, measured, others, searched, options, left_out);
     };
     missing = contested(std::move(missing), terms, refuted, validation, search);
-    if (is_within_noise(missing)) {
-      std::set<std::size_t> all;
-      for (std::size_t t = 0; t < terms.size(); ++t) all.insert(t);
-      missing = taken_back(missing, search(terms, all));
-    }
   }
   fit_on_all_rows(there, recording, measured, terms, searched, options, missing);
   missing.zero_bands = recording.inputs().zero_bands;
