@@ -215,6 +215,20 @@ def test_an_inner_state_is_recognised_by_verdict_or_effect():
     assert not verdicts.said_inner(answer(effect("linear", "x"), unknown={"kind": "smooth"}))
 
 
+@needs_program
+@pytest.mark.parametrize("seed", [0, 1, 10, 4])  # complete, parameters, effect, inner
+def test_a_calibrated_simulation_lacks_the_same_beside_other_parameters(seed, tmp_path):
+    case = generate.case(seed)
+    rows = [way.signals(PROGRAM, case, number, tmp_path)[0] for number in (1, 2)]
+    true = [part.simulated + way.true_gap(case, part) for part in rows]
+    after = way.calibrated(case, *rows)
+    columns = np.column_stack([rows[0].derivatives[name] for name in case.free])
+    assert np.abs(columns.T @ (rows[0].table["u"] - rows[0].simulated)).max() < 1e-6 * np.abs(columns.T @ true[0]).max()
+    assert after.kind == ("parameters" if case.kind == "complete" else case.kind)
+    for part, whole in zip(rows, true):
+        assert np.allclose(part.simulated + way.true_gap(after, part), whole, atol=0.02 * rms(whole))
+
+
 def test_wilson_is_the_interval_of_his_paper():
     low, high = rates.wilson(8, 10)  # Newcombe 1998, method 3
     assert abs(low - 0.4902) < 1e-4 and abs(high - 0.9433) < 1e-4
@@ -227,7 +241,7 @@ def test_the_way_of_a_user_leads_to_a_judged_line(tmp_path):
 
     import judge
 
-    options = argparse.Namespace(program=PROGRAM, words=[], tell_noise=False, through_filter=False, limit=60)
+    options = argparse.Namespace(program=PROGRAM, words=[], tell_noise=False, through_filter=False, calibrated=False, limit=60)
     result = judge.run(options, 1, str(tmp_path))
     assert result["kind"] == "parameters" and result["verdict"] and len(result["rests"]) == 4
     nominal, alone, true, after = result["rests"]
