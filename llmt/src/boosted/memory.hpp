@@ -15,7 +15,7 @@ struct SumSize {
   Eigen::Index levels;  ///< of inputs that are categories, each of which is a feature
 };
 
-/// Estimate (N.2) of the memory in bytes that a fit takes at its peak beyond the caller's data
+/// Estimate (N.4) of the memory in bytes that a fit takes at its peak beyond the caller's data
 /// (docs/algorithms/numerics.md).
 double estimated_memory(const SumSize& size);
 
