@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "boosted/boosting_data.hpp"
 #include "boosted/growing_tree.hpp"
 #include "boosted/model/symmetric_table.hpp"
+#include "boosted/model/tree_walk.hpp"
 #include "boosted/symmetric_grower.hpp"
 #include "llmt/boosted/some_rows.hpp"
 #include "llmt/boosted_model.hpp"
@@ -212,6 +214,66 @@ TEST(SymmetricTable, PredictsManyRowsAsTheSplitsPredictOneToTheBit) {
   }
   const Eigen::MatrixXd predicted = model.predict(inputs);
   for (Eigen::Index i = 0; i < inputs.rows(); ++i) EXPECT_EQ(model.predict(inputs.row(i)), predicted.row(i));
+}
+
+// Splits of any place and width, and leaves of any features.
+llmt::BoostedTree soft_tree(int depth, double pruned, llmt::Random& random) {
+  llmt::BoostedTree tree = some_tree(depth, pruned, random);
+  tree.smallest_share = random.below(3) == 0 ? 0.0 : 0.1 * random.uniform();
+  for (llmt::BoostedSplit& split : tree.splits) {
+    if (random.below(4) == 0) split.feature = static_cast<int>(random.below(num_features));
+    if (random.below(4) > 0) split.half_width = static_cast<double>(1 + random.below(8)) / 4.0;
+  }
+  for (llmt::BoostedLeaf& leaf : tree.leaves) {
+    if (random.below(4) == 0 && !leaf.features.empty()) leaf.features.front() = num_features - 1;
+    if (random.below(4) == 0) leaf.means.clear();
+  }
+  return tree;
+}
+
+TEST(TreeWalk, PredictsManyRowsAsTheSplitsPredictOneToTheBit) {
+  llmt::Random random(3);
+  Eigen::MatrixXd inputs(300, num_features);  // the last block is not full
+  for (double& value : inputs.reshaped()) {
+    value = random.below(30) == 0 ? std::numeric_limits<double>::quiet_NaN()
+                                  : static_cast<double>(random.below(33)) / 16.0 - 1.0;
+  }
+  for (int depth = 0; depth <= 7; ++depth) {
+    for (const double pruned : {0.0, 0.2}) {
+      const llmt::BoostedModel model = some_model({soft_tree(depth, pruned, random), soft_tree(depth, pruned, random)});
+      const Eigen::MatrixXd predicted = model.predict(inputs);
+      for (Eigen::Index i = 0; i < inputs.rows(); ++i) {
+        EXPECT_EQ(model.predict(inputs.row(i)), predicted.row(i)) << depth << " " << i;
+      }
+    }
+  }
+}
+
+TEST(TreeWalk, IsOfTreesOfSixteenLevelsAndSixtyFourPlaces) {
+  llmt::Random random(4);
+  llmt::BoostedTree tree = some_tree(3, 0.0, random);
+  EXPECT_FALSE(llmt::walk_of(tree).has_value());
+  for (llmt::BoostedSplit& split : tree.splits) split.half_width = 0.5;
+  const std::optional<llmt::TreeWalk> walk = llmt::walk_of(tree);
+  ASSERT_TRUE(walk.has_value());
+  EXPECT_EQ(walk->steps.size(), 7U + 8U + 7U);
+  EXPECT_LE(walk->places.size(), 3U);
+  for (const int levels : {16, 17}) {
+    llmt::BoostedTree chain;
+    for (int level = 0; level < levels; ++level) {
+      chain.splits.push_back({.threshold = 0.1 * level, .half_width = 0.5, .left = -1 - level, .right = level + 1});
+      chain.leaves.push_back({.constant = 1.0});
+    }
+    chain.splits.back().right = -1 - levels;
+    chain.leaves.push_back({.constant = 2.0});
+    EXPECT_EQ(llmt::walk_of(chain).has_value(), levels == 16);
+  }
+  llmt::BoostedTree wide = some_tree(7, 0.0, random);
+  for (llmt::BoostedSplit& split : wide.splits) split = {.half_width = 0.5, .left = split.left, .right = split.right};
+  for (std::size_t k = 0; k < wide.splits.size(); ++k) wide.splits[k].threshold = static_cast<double>(k % 64);
+  EXPECT_TRUE(llmt::walk_of(wide).has_value());
+  for (std::size_t k = 0; k < wide.splits.size(); ++k) wide.splits[k].threshold = static_cast<double>(k);
+  EXPECT_FALSE(llmt::walk_of(wide).has_value());
 }
 
 }  // namespace

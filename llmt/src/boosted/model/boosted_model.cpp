@@ -14,6 +14,7 @@
 #include "boosted/model/boosted_checks.hpp"
 #include "boosted/model/symmetric_table.hpp"
 #include "boosted/model/transition.hpp"
+#include "boosted/model/tree_walk.hpp"
 #include "spread/scaled_residuals.hpp"
 
 namespace llmt {
@@ -76,24 +77,38 @@ std::vector<std::optional<SymmetricTable>> tables_of(const BoostedSum& sum, Eige
   return tables;
 }
 
-// Features that a row must have so that all tables hold for it: without one of the others it goes to one side, or
-// counts in the leaves as 0.
-std::vector<int> needed_by(const std::vector<std::optional<SymmetricTable>>& tables) {
-  std::vector<int> needed;
-  for (const std::optional<SymmetricTable>& table : tables) {
-    if (table) needed.insert(needed.end(), table->needed.begin(), table->needed.end());
+// Of trees without a table.
+std::vector<std::optional<TreeWalk>> walks_of(const BoostedSum& sum,
+                                              const std::vector<std::optional<SymmetricTable>>& tables,
+                                              Eigen::Index rows) {
+  std::vector<std::optional<TreeWalk>> walks(sum.trees.size());
+  if (rows < enough_for_tables) return walks;
+  for (std::size_t k = 0; k < walks.size(); ++k) {
+    if (!tables[k]) walks[k] = walk_of(sum.trees[k]);
+  }
+  return walks;
+}
+
+// Features that a row must have so that all tables and walks hold for it: without one of the others it goes to one
+// side, or counts in the leaves as 0.
+template <class OfTree>
+void add_needed(const std::vector<std::optional<OfTree>>& trees, std::vector<int>& needed) {
+  for (const std::optional<OfTree>& tree : trees) {
+    if (tree) needed.insert(needed.end(), tree->needed.begin(), tree->needed.end());
   }
   std::ranges::sort(needed);
   const auto repeated = std::ranges::unique(needed);
   needed.erase(repeated.begin(), repeated.end());
-  return needed;
 }
 
 void predict_by(const BoostedModel& model, const BoostedSum& sum, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                 int max_threads, Eigen::Ref<Eigen::VectorXd> result) {
   const std::vector<std::optional<SymmetricTable>> tables = tables_of(sum, inputs.rows());
-  const bool has_tables = std::ranges::any_of(tables, [](const auto& table) { return table.has_value(); });
-  const std::vector<int> needed = needed_by(tables);
+  const std::vector<std::optional<TreeWalk>> walks = walks_of(sum, tables, inputs.rows());
+  const bool is_by_columns = inputs.rows() >= enough_for_tables;
+  std::vector<int> needed;
+  add_needed(tables, needed);
+  add_needed(walks, needed);
   const RowBlocks blocks{inputs.rows(), rows_at_once};
   parallel_for(blocks.count(), max_threads, [&](Eigen::Index block) {
     const auto [begin, end] = blocks[block];
@@ -108,7 +123,7 @@ void predict_by(const BoostedModel& model, const BoostedSum& sum, const Eigen::R
     }
     Eigen::MatrixXd columns;  // the same, feature by feature
     Eigen::MatrixXd in_slopes;
-    if (has_tables) {
+    if (is_by_columns) {
       columns.setZero(rows_at_once, z.rows());
       columns.topRows(count) = z.transpose();
       in_slopes = columns.array().isNaN().select(0.0, columns);
@@ -118,6 +133,8 @@ void predict_by(const BoostedModel& model, const BoostedSum& sum, const Eigen::R
     for (std::size_t k = 0; k < sum.trees.size(); ++k) {
       if (tables[k]) {
         add_values(*tables[k], columns.data(), in_slopes.data(), values.data());
+      } else if (walks[k]) {
+        add_values(*walks[k], columns.data(), in_slopes.data(), values.data());
       } else {
         for (Eigen::Index i = 0; i < count; ++i) values[i] += value_of(sum.trees[k], z.col(i).data());
       }
