@@ -239,15 +239,17 @@ bool may_be_applied(const Missing& missing) {
     left += gap.nominal > 0.0 ? std::pow(gap.after / gap.nominal, 2.0) : 1.0;
     outputs += 1.0;
   }
-  const bool is_confirmed = std::ranges::any_of(missing.found, &FoundTerm::confirmed);
   switch (missing.answer) {
     case Answer::nothing_missing:
     case Answer::failed_held_out:
       return false;
     case Answer::parameters_only:  // nothing was added, so the simulation as it was given is what counts
       return left <= outputs;
-    default:  // what is not confirmed may stand for something else
-      return !is_worse(missing) && (is_confirmed || !(2.0 * left > outputs));
+    case Answer::unknown:
+    case Answer::undecided:  // what was fitted may stand for what is missing
+      return !is_worse(missing) && !(2.0 * left > outputs);
+    default:
+      return !is_worse(missing);
   }
 }
 
