@@ -128,25 +128,25 @@ void predict_by(const BoostedModel& model, const BoostedSum& sum, const Eigen::R
       columns.topRows(count) = z.transpose();
       in_slopes = columns.array().isNaN().select(0.0, columns);
     }
+    std::vector<Eigen::Index> by_splits;  // rows that tables and walks do not hold for
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const auto is_lacking = [&](int feature) { return std::isnan(z(feature, i)); };
+      if (std::ranges::any_of(needed, is_lacking)) by_splits.push_back(i);
+    }
     // Tree by tree, so that a tree stays in the cache for the rows of the block.
     std::array<double, rows_at_once> values = {};
     for (std::size_t k = 0; k < sum.trees.size(); ++k) {
-      if (tables[k]) {
-        add_values(*tables[k], columns.data(), in_slopes.data(), values.data());
-      } else if (walks[k]) {
-        add_values(*walks[k], columns.data(), in_slopes.data(), values.data());
-      } else {
+      if (!tables[k] && !walks[k]) {
         for (Eigen::Index i = 0; i < count; ++i) values[i] += value_of(sum.trees[k], z.col(i).data());
+        continue;
       }
+      const std::array<double, rows_at_once> before = values;
+      const bool is_for_some = std::ssize(by_splits) < count;
+      if (is_for_some && tables[k]) add_values(*tables[k], columns.data(), in_slopes.data(), values.data());
+      if (is_for_some && walks[k]) add_values(*walks[k], columns.data(), in_slopes.data(), values.data());
+      for (const Eigen::Index i : by_splits) values[i] = before[i] + value_of(sum.trees[k], z.col(i).data());
     }
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const auto is_lacking = [&](int feature) { return std::isnan(z(feature, i)); };
-      if (std::ranges::any_of(needed, is_lacking)) {
-        values[i] = 0.0;
-        for (const BoostedTree& tree : sum.trees) values[i] += value_of(tree, z.col(i).data());
-      }
-      result(begin + i) = sum.base + sum.rate * values[i];
-    }
+    for (Eigen::Index i = 0; i < count; ++i) result(begin + i) = sum.base + sum.rate * values[i];
   });
 }
 
