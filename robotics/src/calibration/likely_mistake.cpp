@@ -24,8 +24,10 @@
 namespace llmt::robotics {
 namespace {
 
+constexpr double far_better = 0.1;
+
 // Points or distances of as many poses as tell such mistakes, at equal steps.
-Measurements some_of(const Measurements& measurements) {
+std::vector<Eigen::Index> some_rows(const Measurements& measurements) {
   constexpr std::size_t enough = 25;
   std::map<Eigen::Index, std::vector<Eigen::Index>> stands;
   for (const Eigen::Index row : position_rows(measurements.poses)) {
@@ -38,8 +40,10 @@ Measurements some_of(const Measurements& measurements) {
     if (place++ % step == 0) rows.insert(rows.end(), own.begin(), own.end());
   }
   std::ranges::sort(rows);
-  return select(measurements, rows);
+  return rows;
 }
+
+Measurements some_of(const Measurements& measurements) { return select(measurements, some_rows(measurements)); }
 
 double spread_of(const Eigen::MatrixXd& points) {
   return std::sqrt((points.rowwise() - points.colwise().mean()).rowwise().squaredNorm().mean());
@@ -142,8 +146,14 @@ Candidate with(const Candidate& before, const Change& change, double share) {
   return now;
 }
 
+// Readings as they stand, and as they were meant.
+struct Readings {
+  Measurements given;
+  Measurements meant;
+};
+
 // Readings from a row on that belong to the pose `by` rows away.
-Measurements slipped(const Measurements& table, Eigen::Index from, Eigen::Index by) {
+Readings slipped(const Measurements& table, Eigen::Index from, Eigen::Index by) {
   std::vector<Eigen::Index> readings;
   std::vector<Eigen::Index> poses;
   for (Eigen::Index i = 0; i < table.count(); ++i) {
@@ -152,9 +162,10 @@ Measurements slipped(const Measurements& table, Eigen::Index from, Eigen::Index 
     readings.push_back(i);
     poses.push_back(pose);
   }
-  Measurements meant = select(table, readings);
+  Measurements given = select(table, readings);
+  Measurements meant = given;
   meant.poses.joints = table.poses.joints(poses, Eigen::all).eval();
-  return meant;
+  return {std::move(given), std::move(meant)};
 }
 
 // Distances of all rows where base and tool are those that some of them tell; empty: they tell none.
@@ -200,9 +211,14 @@ std::vector<Explanation> mistakes_of_rows(const Robot& robot, const Measurements
   const Eigen::Index n = table.count();
   const std::vector<Eigen::Index> first = rows_between(0, std::max(fewest, n / 4));
   if (!table.poses.observations.empty() || n < 4 * fewest) return found;
-  const auto add = [&](const Measurements& meant, std::string name, std::string words) {
-    const Measurements some = some_of(meant);
+  // Among all rows there may be a gross reading that is not among these: then nothing is better for them.
+  const auto is_better = [&](double misfit_mm, const Measurements& given) {
+    return misfit_mm < far_better * misfit_of(robot, given);
+  };
+  const auto add = [&](const Readings& readings, std::string name, std::string words) {
+    const Measurements some = some_of(readings.meant);
     const double misfit_mm = misfit_of(robot, some);
+    if (!is_better(misfit_mm, some_of(readings.given))) return;
     found.push_back({misfit_mm / spread_of(some.positions_mm), misfit_mm, std::move(name), std::move(words)});
   };
   const Eigen::VectorXd as_it_stands = distances_by(robot, table, first);
@@ -210,7 +226,7 @@ std::vector<Explanation> mistakes_of_rows(const Robot& robot, const Measurements
     add(slipped(table, 0, by), by > 0 ? "readings_early" : "readings_late",
         fmt::format("each reading belongs to the pose one row {}", by > 0 ? "later" : "before"));
     // Of the rows that have such a pose, those of the first part tell base and tool.
-    const Measurements moved = slipped(table, 0, by);
+    const Measurements moved = slipped(table, 0, by).meant;
     if (as_it_stands.size() == 0) continue;
     Robot placed = robot;
     register_frames(placed, some_of(select(table, first)));
@@ -227,10 +243,15 @@ std::vector<Explanation> mistakes_of_rows(const Robot& robot, const Measurements
   if (as_it_stands.size() == 0 || later.size() == 0) return found;
   const Eigen::Index border = best_border(as_it_stands, later);
   if (border < fewest || border > n - fewest) return found;
-  const double both =
-      (static_cast<double>(border) * misfit_of(robot, some_of(select(table, rows_between(0, border)))) +
-       static_cast<double>(n - border) * misfit_of(robot, some_of(select(table, rows_between(border, n))))) /
-      static_cast<double>(n);
+  std::vector<Eigen::Index> rows;
+  double both = 0.0;
+  for (const auto& [begin, end] : {std::pair{Eigen::Index{0}, border}, std::pair{border, n}}) {
+    const Measurements part = select(table, rows_between(begin, end));
+    const std::vector<Eigen::Index> some = some_rows(part);
+    both += static_cast<double>(end - begin) / static_cast<double>(n) * misfit_of(robot, select(part, some));
+    for (const Eigen::Index row : some) rows.push_back(begin + row);
+  }
+  if (!is_better(both, select(table, rows))) return found;
   found.push_back({both / spread_of(table.positions_mm), both,
                    fmt::format("instrument_moved_at_{}", line_of(table, border)),
                    fmt::format("the instrument or the target was moved before line {} (a column `session` says so)",
@@ -240,7 +261,6 @@ std::vector<Explanation> mistakes_of_rows(const Robot& robot, const Measurements
 
 // Of what the positions show.
 std::optional<Suspicion> mistake_of_positions(const Robot& robot, const Measurements& measurements) {
-  constexpr double far_better = 0.1;
   constexpr double of_spread = 0.05;
   constexpr double as_good = 1.05;
   constexpr double plausible_share = 1.0 / 50.0;  // of the arm's length, as is_implausible()
