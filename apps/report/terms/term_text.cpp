@@ -88,7 +88,9 @@ std::string inner_state_text(const discovery::Missing& missing) {
 }
 
 // "undecided: what is left of u is 148 times its noise, and no term tried explains it".
-std::string undecided_text(const discovery::Missing& missing) {
+std::string undecided_text(const discovery::Missing& missing, const std::string& terms) {
+  if (!missing.found.empty())
+    return "undecided: " + terms + " missing, but these rows do not tell which function it is";
   const auto times = [](const discovery::Gap& gap) {
     return gap.known_noise > 0.0 ? gap.after / gap.known_noise : 0.0;
   };
@@ -130,7 +132,7 @@ std::string headline(const discovery::Missing& missing) {
     case discovery::Answer::inner_state:
       return inner_state_text(missing);
     case discovery::Answer::undecided:
-      return undecided_text(missing);
+      return undecided_text(missing, terms);
   }
   return "";
 }

@@ -192,7 +192,7 @@ TEST(Contests, FewerNumbersHaveTheNameWhereRowsCannotTell) {
   const Missing differing = better_of(found, log.answer({"square"}, 1.11), {0.0, 1.0});
   EXPECT_EQ(differing.found[0].family, "square");
   EXPECT_FALSE(differing.found[0].confirmed);
-  EXPECT_EQ(differing.answer, Answer::indistinguishable);
+  EXPECT_EQ(differing.answer, Answer::undecided);
 
   // Nothing has fewer numbers than anything, and no rival.
   Missing nothing = log.answer({});

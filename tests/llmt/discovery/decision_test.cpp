@@ -60,6 +60,7 @@ void add_fact(const std::string& what, Missing& missing) {
     missing.gaps[0].known_noise = 1.0;
   }
   if (what.starts_with("parameters")) missing.parameters_explain = true;
+  if (what.starts_with("a rival is another")) object(missing, Reason::rival, {0});
 }
 
 // Effects in parts approximate any function, as the leaves of a tree do; one of them is a name.
@@ -83,7 +84,7 @@ TEST(Decision, SeveralEffectsInPartsMayStandForAnother) {
 
 TEST(Decision, IsThatOfTheTableInTheDocs) {
   const std::vector<std::vector<std::string>> rows = rows_of_the_page();
-  ASSERT_EQ(rows.size(), 11u);
+  ASSERT_EQ(rows.size(), 12u);
   for (const std::vector<std::string>& cells : rows) {
     ASSERT_EQ(cells.size(), 3u);
     Missing missing;
@@ -130,16 +131,25 @@ TEST(Decision, ConfirmsTheTermsOfAnOutputTogether) {
   EXPECT_EQ(missing.answer, Answer::unknown);
 }
 
-// Which of two functions it is, is not known; that it is one of them is.
-TEST(Decision, ATermWithARivalThatIsAnotherFunctionIsNamedButTentative) {
+// Which of two functions it is, is not known. On rows like these the two are alike, so either may be added.
+TEST(Decision, ATermWithARivalThatIsAnotherFunctionIsUndecided) {
   Missing missing;
   missing.verdict.answer = Answer::named;
   missing.found = {term()};
   missing.found[0].rivals = {{"cube x", {"x"}, false}};
-  object(missing, Reason::rival, {0});
   decide(missing);
   EXPECT_EQ(missing.answer, Answer::indistinguishable);
+  EXPECT_TRUE(missing.found[0].confirmed);
+  object(missing, Reason::rival, {0});
+  decide(missing);
+  EXPECT_EQ(missing.answer, Answer::undecided);
   EXPECT_FALSE(missing.found[0].confirmed);
+  missing.gaps = {Gap{.output = "", .before = 1.0, .after = 0.9, .noise_floor = 0.1, .nominal = 1.0}};
+  EXPECT_TRUE(may_be_applied(missing));
+  object(missing, Reason::known_noise, {0});
+  decide(missing);
+  EXPECT_EQ(missing.answer, Answer::unknown);
+  EXPECT_FALSE(may_be_applied(missing));
 }
 
 // A state is what it is named; whether its size is certain is another question.

@@ -89,7 +89,7 @@ TEST(Groups, HoldTheTermsThatLeaveAsLittle) {
   }
   EXPECT_GE(inside, 1);
   EXPECT_GE(outside, 2);
-  EXPECT_EQ(missing.answer, Answer::indistinguishable);
+  EXPECT_EQ(missing.answer, Answer::undecided);
 }
 
 TEST(Groups, AreTentativeWhereTheirFunctionsDiffer) {

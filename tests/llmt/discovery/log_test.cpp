@@ -91,42 +91,6 @@ TEST(FilteredRows, AJumpBetweenRowsCountsWhereItIs) {
   }
 }
 
-// Columns of signals() went through the filter once, so what is linear in them is right as it stands: of an
-// acceleration near the cutoff a second filter takes a part away. What jumps with a speed is right behind the filter
-// alone.
-TEST(FilteredRows, TheSimulationIsFilteredWhereThatIsRight) {
-  const auto shaken = [](double t) -> Eigen::Vector3d {
-    const double w = 2.0 * 3.14159 * 4.5;  // the cutoff is 6 Hz
-    return motion(t) + 0.02 * Eigen::Vector3d(std::sin(w * t), w * std::cos(w * t), -w * w * std::sin(w * t));
-  };
-  const Model linear;
-  const auto at_once = [&](double t) { return linear.torque(shaken(t)); };
-  const Missing missing = missing_from(rows_of_log(1, linear, 0.05, at_once, {.cutoff = 6.0}, shaken));
-  EXPECT_EQ(missing.answer, Answer::nothing_missing) << to_string(missing.answer);
-  EXPECT_FALSE(missing.time.filtered);
-  EXPECT_TRUE(std::ranges::any_of(missing.notes, [](const std::string& note) {
-    return note.starts_with("the simulation was taken as it stands");
-  }));
-  EXPECT_LT(missing.gaps[0].after, 2.0 * missing.gaps[0].known_noise);
-  const Model dry{.dry = 2.0};
-  const Missing rounded = missing_from(rows_of_log(1, dry, 0.05, [&](double t) { return dry.torque(motion(t)); }));
-  EXPECT_TRUE(rounded.time.filtered);
-}
-
-// Among filtered rows the constant of a peak is tried at single rows first, where a Coulomb part beside it makes up for
-// a constant that is a little off: with everything fitted, nothing is left for that part.
-TEST(FilteredRows, ATermThatContainsTheRightOneDoesNotTakeItsName) {
-  const Model linear;
-  for (const double c : {0.035, 0.05}) {
-    const auto peak = [&](double q) { return 6.0 * (q > 0.0 ? 1.0 : -1.0) * std::exp(-(q / c) * (q / c)); };
-    const auto torque = [&](double t) { return linear.torque(motion(t)) + peak(motion(t)(0)); };
-    const Missing missing = missing_from(rows_of_log(1, linear, 0.05, torque));
-    ASSERT_EQ(missing.found.size(), 1u) << c;
-    EXPECT_EQ(missing.found[0].family + " " + missing.found[0].location, "stribeck q") << c;
-    EXPECT_NEAR(missing.found[0].values[0].value, 6.0, 0.3) << c;
-  }
-}
-
 // Dry friction that the model has: the filter of the log rounds it at every reversal.
 TEST(FilteredRows, ACompleteModelWithDryFrictionLacksNothing) {
   const Model model{.dry = 2.0};
@@ -244,47 +208,6 @@ TEST(Regimes, AnEffectBeyondAThresholdIsNamedWithIt) {
     EXPECT_EQ(found.regime, "q");
     EXPECT_NEAR(found.constants(0), threshold, 0.05);
     EXPECT_NEAR(found.coefficients(0), 0.5, 0.02);
-  }
-}
-
-// Rows at rest are set apart for the friction that they may have. Thresholds 0 and -band fit the others alike, and the
-// rows at rest say which it is. Friction at rest, of either sign, does not mislead.
-TEST(Regimes, WhetherAnEffectActsAtRestIsReadThere) {
-  constexpr Eigen::Index n = 600;
-  constexpr double band = 0.01;
-  for (const bool acts_at_rest : {false, true}) {
-    llmt::Random random(7);
-    Inputs inputs{{"q", "dq"}, Eigen::MatrixXd(n, 2)};
-    inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, 6.0);
-    Eigen::MatrixXd measured(n, 1);
-    SearchedRows rows{.apart = std::vector<bool>(n), .at_rest = Eigen::Vector2d(0.0, band)};
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const bool rests = i / 40 % 3 == 2;
-      const double speed = rests ? 0.0 : i / 40 % 3 == 0 ? 1.0 : -1.0;
-      inputs.values.row(i) << 2.0 * random.uniform() - 1.0, speed * (0.1 + random.uniform()) + 1e-4 * random.normal();
-      const bool acts = rests ? acts_at_rest : speed > 0.0;
-      const double friction = rests ? 0.3 * (2.0 * random.uniform() - 1.0) : 0.0;
-      measured(i, 0) = (acts ? 1.5 * inputs.values(i, 0) : 0.0) + friction + 0.01 * random.normal();
-      rows.apart[static_cast<std::size_t>(i)] = rests;
-    }
-    const std::vector<ModelTerm> terms = regime_terms(inputs, standard_terms(inputs));
-    const auto term = std::ranges::find_if(
-        terms, [](const ModelTerm& t) { return t.family == "linear" && t.location == "q where dq > c"; });
-    ASSERT_NE(term, terms.end());
-    Missing missing;
-    missing.answer = Answer::named;
-    missing.held_out = {0};
-    missing.gaps.resize(1);
-    missing.gaps[0].noise_floor = 0.05;
-    missing.parameters = tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"}).parameters;
-    FoundTerm found;
-    found.term = static_cast<std::size_t>(term - terms.begin());
-    found.constants = Eigen::VectorXd::Zero(1);
-    found.coefficients = Eigen::VectorXd::Constant(1, 1.4);
-    missing.found = {found};
-    fit_on_all_rows(tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"}), Recording(inputs), {{"y"}, measured, {}}, terms,
-                    rows, {}, missing);
-    EXPECT_EQ(missing.found[0].constants(0), acts_at_rest ? -band : 0.0);
   }
 }
 

@@ -223,7 +223,8 @@ bool is_worse(const Missing& missing);
 /// Whether what was found may be added to a simulation of other rows: the answer is a term, a state or parameters that
 /// are off, and not is_worse(). Where it is "unknown" or "undecided", terms and parameters may stand for what is
 /// missing; they may be added where they take away more than they leave, sum over the outputs that they change of
-/// Gap::after^2 / nominal^2 at most half their number. Changes of parameters where nothing is missing may not.
+/// Gap::after^2 / nominal^2 at most half their number. Not so where the only objection is that other functions explain
+/// the rows alike (Reason::rival). Changes of parameters where nothing is missing may not be added.
 bool may_be_applied(const Missing& missing);
 
 }  // namespace llmt::discovery

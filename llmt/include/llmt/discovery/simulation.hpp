@@ -62,7 +62,8 @@ Simulation linearised(Simulation simulation, const Eigen::MatrixXd& simulated, s
 ///
 /// When the verdict stands, everything is fitted once more on all rows. Terms of regimes (ModelTerm::regime) are tried
 /// where the others leave something. With MeasuredOutputs::noise, the answer is undecided where nothing was found and
-/// more than 5 times the known noise is left; terms beside so much are not confirmed.
+/// more than 5 times the known noise is left; terms beside so much are not confirmed. It is undecided, too, where
+/// functions that differ from what was found by more than a tenth explain these rows alike.
 ///
 /// The answer is parameters_only where nothing is missing and k free parameters gain, with n values of each output o,
 ///   sum_o n ln(RSS_o at the nominal values / RSS_o fitted) - k ln(n d) > 0,

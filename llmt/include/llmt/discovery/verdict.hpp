@@ -134,7 +134,8 @@ enum class Answer {
   failed_held_out,  ///< of find_missing(): with what was found the error on rows set aside is larger
   parameters_only,  ///< of find_missing(): nothing is missing, but parameters are off their nominal values
   inner_state,  ///< of find_missing(): a term that stands for a state which the inputs do not show is among the named
-  undecided     ///< of find_missing(): nothing was found, but more is left than the noise that is known
+  undecided     ///< of find_missing(): nothing was found, but more is left than the noise that is known; or functions
+                ///< that differ elsewhere explain these rows alike
 };
 
 /// A cause that would have won, had its values been within their limits.

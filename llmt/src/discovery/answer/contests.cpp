@@ -287,7 +287,7 @@ bool leaves_something(const Missing& missing) {
   };
   if (missing.answer == Answer::inner_state || std::ranges::all_of(missing.gaps, is_noise)) return false;
   if (missing.time.in_time && missing.time.independent_share < alike_in_neighbours) return true;
-  return missing.answer == Answer::unknown || missing.answer == Answer::undecided ||
+  return missing.answer == Answer::unknown || (missing.answer == Answer::undecided && missing.found.empty()) ||
          missing.answer == Answer::failed_held_out || !missing.structure.empty();
 }
 

@@ -101,7 +101,7 @@ struct Ruling {
 
 constexpr auto always = [](const Missing&) { return true; };
 
-constexpr std::array<Ruling, 11> rulings = {{
+constexpr std::array<Ruling, 12> rulings = {{
     {[](const Missing& missing) { return is_raised(missing, Reason::larger_error); }, Certainty::any,
      Answer::failed_held_out},
     {[](const Missing& missing) { return std::ranges::any_of(missing.found, is_certain_state); }, Certainty::any,
@@ -114,6 +114,7 @@ constexpr std::array<Ruling, 11> rulings = {{
     {[](const Missing& missing) { return is_raised(missing, Reason::drift); }, Certainty::none, Answer::unknown},
     {always, Certainty::none, Answer::nothing_missing},
     {always, Certainty::tentative, Answer::unknown},
+    {[](const Missing& missing) { return is_raised(missing, Reason::rival); }, Certainty::rivalled, Answer::undecided},
     {always, Certainty::rivalled, Answer::indistinguishable},
     {always, Certainty::certain, Answer::named},
 }};
@@ -125,7 +126,7 @@ Certainty certainty_of(const Missing& missing) {
   if (has_other_objections) return Certainty::tentative;
   const bool has_rivals =
       std::ranges::any_of(missing.found, [](const FoundTerm& found) { return !found.rivals.empty(); });
-  return has_rivals ? Certainty::rivalled : Certainty::certain;
+  return has_rivals || is_raised(missing, Reason::rival) ? Certainty::rivalled : Certainty::certain;
 }
 
 }  // namespace
@@ -246,8 +247,8 @@ bool may_be_applied(const Missing& missing) {
     case Answer::parameters_only:  // nothing was added, so the simulation as it was given is what counts
       return left <= outputs;
     case Answer::unknown:
-    case Answer::undecided:  // what was fitted may stand for what is missing
-      return !is_worse(missing) && !(2.0 * left > outputs);
+    case Answer::undecided:  // what was fitted may stand for what is missing; functions that fit alike do not
+      return !is_worse(missing) && (!(2.0 * left > outputs) || certainty_of(missing) == Certainty::rivalled);
     default:
       return !is_worse(missing);
   }

@@ -168,66 +168,6 @@ void name_groups(const TermModel& model, const TermData& data, const TermFit& fi
 
 namespace {
 
-bool is_simpler_at_the_same_inputs(const ModelTerm& term, const ModelTerm& than) {
-  return may_stand_for(term, than) && std::ranges::is_permutation(term.inputs, than.inputs) &&
-         term.output == than.output &&
-         term.coefficients.size() + term.constants.size() < than.coefficients.size() + than.constants.size();
-}
-
-// The search fits coefficients beside constants that are tried, so a term of more coefficients may have come first
-// although one that it contains is right. The best simpler term of the same inputs takes its place if, everything
-// fitted, it leaves no more than its fewer numbers are worth: phi N / 2 ln(S'/S) <= (k - k') / 2 ln(phi N).
-void take_simpler(const TermModel& model, const TermData& data, TermFit& fit, Missing& missing) {
-  constexpr double alike = 0.1;
-  const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
-  const double samples = data.independent_share * static_cast<double>(data.samples.size());
-  const auto left_by = [&](const TermFit& of) {
-    return scaled_residuals(model, data, of.parameters, of.placed).squaredNorm();
-  };
-  for (std::size_t k = 0; k < fit.placed.size(); ++k) {
-    const PlacedTerm placed = fit.placed[k];
-    const ModelTerm& own_term = model.terms()[placed.term];
-    if (!may_have_another(own_term)) continue;
-    std::optional<Ground> place;
-    std::optional<TermFit> best;
-    double least = 0.0;
-    for (std::size_t t = 0; t < model.terms().size(); ++t) {
-      const ModelTerm& term = model.terms()[t];
-      if (!is_simpler_at_the_same_inputs(term, own_term)) continue;
-      if (!place) place.emplace(ground_without(model, data, fit, k));
-      const InPlace own = place->with(model, data, placed, simulated);
-      PlacedTerm at_own{t, placed.output, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0};
-      if (term.constants.size() == own_term.constants.size()) at_own.constants = placed.constants;
-      std::vector<PlacedTerm> options = options_of(model, data, place->ground(), t, placed, simulated);
-      if (at_own.constants.size() == std::ssize(term.constants)) options.push_back(std::move(at_own));
-      for (PlacedTerm& option : options) {
-        const InPlace other = place->with(model, data, option, simulated);
-        if (!((other.function - own.function).norm() < alike * own.function.norm())) continue;
-        std::vector<PlacedTerm> others = fit.placed;
-        others[k] = std::move(option);
-        const TermFit fitted = fit_terms(model, data, fit.parameters, others);
-        const double evidence = 0.5 * samples * std::log(left_by(fitted) / left_by(fit)) +
-                                0.5 * (other.numbers - own.numbers) * std::log(samples);
-        if (!(evidence <= least)) continue;
-        least = evidence;
-        best = fitted;
-      }
-    }
-    if (!best) continue;
-    fit = std::move(*best);
-    FoundTerm simpler = described(model, fit.placed[k], fit.errors[k]);
-    FoundTerm& found = missing.found[k];
-    simpler.share = found.share;
-    simpler.shrinks_gap = found.shrinks_gap;
-    simpler.rivals = std::move(found.rivals);
-    simpler.confirmed = found.confirmed;
-    std::erase_if(simpler.rivals, [name = name_of(model.terms()[simpler.term])](const RivalTerms& rival) {
-      return rival.what == name || rival.what.starts_with(name + " (");  // with its constant
-    });
-    found = std::move(simpler);
-  }
-}
-
 // Sums keep the parts that the search has found.
 void move_parameters(const TermFit& fit, const TermFit& alone, double false_alarm_rate, Missing& missing) {
   for (FittedParameter& fitted : missing.fitted_parameters) {
@@ -283,29 +223,6 @@ std::optional<RowSplit> without_outliers(const TermModel& model, const MeasuredO
   return with_samples(split, kept);
 }
 
-// Rows at which a speed rests are set apart, and they alone say whether an effect beyond 0 acts at rest: [x > 0] does
-// not, [x > -band] does, and at most rows that are fitted the two are one. The one with the smaller sum of squares at
-// rest is taken: (y - p)' (q - p) > (q - p)' (q - p) / 2, p and q what the two predict.
-void place_thresholds_at_rest(const TermModel& model, const MeasuredOutputs& measured, const Eigen::VectorXd& at_rest,
-                              TermFit& fit) {
-  for (PlacedTerm& placed : fit.placed) {
-    const ModelTerm& term = model.terms()[placed.term];
-    if (term.regime.empty() || at_rest.size() == 0) continue;
-    const double band = at_rest(std::ranges::find(model.inputs().names, term.regime) - model.inputs().names.begin());
-    double& threshold = placed.constants(placed.constants.size() - 1);
-    if (threshold != 0.0 || !(band > 0.0)) continue;
-    const auto predicted = [&](double place) -> Eigen::VectorXd {
-      threshold = place;
-      return model.recording().as_measured(model.predict(fit.parameters, fit.placed)).col(placed.output);
-    };
-    const Eigen::ArrayXd rests = (model.input(term.regime).array().abs() < band).cast<double>();
-    const Eigen::ArrayXd own = predicted(0.0);
-    const Eigen::ArrayXd change = rests * (predicted(-band).array() - own);
-    const double common = ((measured.values.col(placed.output).array() - own) * change).sum();
-    threshold = common > 0.5 * change.square().sum() ? -band : 0.0;
-  }
-}
-
 }  // namespace
 
 void fit_on_all_rows(const Simulation& simulation, const Recording& recording, const MeasuredOutputs& measured,
@@ -334,12 +251,11 @@ void fit_on_all_rows(const Simulation& simulation, const Recording& recording, c
   hold(model, data, start, placed);
   TermFit fit = fit_terms(model, data, start, placed);
   if (retry_constants(model, data, data, fit)) fit = fit_terms(model, data, fit.parameters, fit.placed);
-  take_simpler(model, data, fit, missing);
-  place_thresholds_at_rest(model, measured, rows.at_rest, fit);
   const TermFit alone = fit_terms(model, data, start, {});
   set_trial_errors(model, data, fit);
-  const bool is_certain = missing.answer == Answer::named || missing.answer == Answer::indistinguishable;
-  if (recording.is_in_time() && is_certain) name_groups(model, data, fit, missing);
+  const bool has_names = missing.answer == Answer::named || missing.answer == Answer::indistinguishable ||
+                         missing.answer == Answer::undecided;
+  if (recording.is_in_time() && has_names) name_groups(model, data, fit, missing);
   correct_estimates(errors, data, fit);
   for (std::size_t k = 0; k < missing.found.size(); ++k) set_estimates(fit.placed[k], fit.errors[k], missing.found[k]);
   move_parameters(fit, alone, options.search.false_alarm_rate, missing);

@@ -163,14 +163,9 @@ Missing find(const Simulation& simulation, const Recording& as_given, const Meas
   smooth.recording = resting.with_zero_bands(bands_of_errors(resting.inputs()));
   const Recording& recording = smooth.recording;
   SearchedRows rows{.apart = std::vector<bool>(inputs_as_given.rows(), false)};
-  rows.at_rest = resting.inputs().zero_bands;
   mark(apart, rows.apart);
   for (const Eigen::Index row : smooth.unknown_sign) rows.apart[row] = true;
-  if (recording.is_filtered()) {
-    const RowSplit split = without_rows(split_in_time(recording, options, 1), rows.apart);
-    if (is_plain(split, measured.values, simulated)) smooth.recording = recording.with_plain_simulation();
-    rows.columns = std::make_shared<ColumnCache>(recording);
-  }
+  if (recording.is_filtered()) rows.columns = std::make_shared<ColumnCache>(recording);
   std::set<std::size_t> refuted = terms_of_regimes(terms);
   Beginning beginning = begin(there, recording, measured, terms, rows, options, refuted);
   // The filter of a recording looks like a state whose constants are not those of a machine.
@@ -190,7 +185,7 @@ Missing find(const Simulation& simulation, const Recording& as_given, const Meas
   }
   fit_on_all_rows(there, recording, measured, terms, searched, options, missing);
   missing.zero_bands = recording.inputs().zero_bands;
-  missing.time.filtered = recording.goes_through_filter();
+  missing.time.filtered = recording.is_filtered();
   if (is_smoothed) {
     missing.before -= smooth.change;
     missing.corrected = as_given.as_measured(with_found_terms(simulation, missing, terms, as_given));
@@ -199,11 +194,6 @@ Missing find(const Simulation& simulation, const Recording& as_given, const Meas
   std::ranges::move(beginning.at_reversals, std::back_inserter(apart));
   std::vector<std::string> notes = smooth.notes;
   tell(apart, notes);
-  if (recording.is_filtered() && !recording.goes_through_filter()) {
-    notes.push_back(
-        "the simulation was taken as it stands: filtered as the measured outputs were, it would leave more than twice "
-        "as much, because the motion is as fast as the cutoff");
-  }
   missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
   return missing;
 }

@@ -215,8 +215,7 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
                               const MissingOptions& options) {
   const Linearisation linearisation(simulation, derivatives, inputs, measured);
   const Eigen::VectorXd start = values_of(simulation.parameters);
-  const Recording of_rows(inputs);
-  Recording recording = of_rows;
+  const Recording recording(inputs);
   const Eigen::MatrixXd nominal = linearisation.outputs(start);
   refuse_random(nominal, linearisation.outputs(start), measured.names);
   Eigen::VectorXd values = start;
@@ -227,8 +226,6 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
   for (int step = 0; step < most_steps && !settled; ++step) {
     const Simulation linear = linearisation.at(values, outputs);
     missing = find_missing(linear, inputs, measured, terms, options);
-    const bool is_plain = of_rows.goes_through_filter() && !missing.time.filtered;
-    recording = is_plain ? of_rows.with_plain_simulation() : of_rows;
     terms_added = added(linear, missing, recording);
     const double before = left(missing, measured, recording.as_measured(outputs) + terms_added);
     Eigen::VectorXd next = values_of(missing.parameters);

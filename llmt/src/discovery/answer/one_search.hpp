@@ -14,10 +14,9 @@ namespace llmt::discovery {
 
 /// The rows of a search.
 struct SearchedRows {
-  std::vector<bool> apart;                    ///< not searched, not set aside either
+  std::vector<bool> apart = {};               ///< not searched, not set aside either
   Eigen::Index fewest_samples = 1000;         ///< that averaging rows in time may leave
   std::shared_ptr<ColumnCache> columns = {};  ///< of filtered rows
-  Eigen::VectorXd at_rest = {};               ///< zero bands within which rows are apart; empty: none
 };
 
 /// The rows that are searched and those set aside.

@@ -150,12 +150,6 @@ Recording Recording::with_values(Eigen::MatrixXd values) const {
   return other;
 }
 
-Recording Recording::with_plain_simulation() const {
-  Recording other = *this;
-  other.is_plain_ = true;
-  return other;
-}
-
 const Pieces& Recording::pieces() const {
   return once(known_.pieces, [&] { return pieces_of(inputs_, rows_.sequence); });
 }
@@ -174,11 +168,11 @@ const RowFilter& Recording::filter() const {
 }
 
 Eigen::MatrixXd Recording::as_measured(const Eigen::MatrixXd& of_rows) const {
-  return goes_through_filter() ? filter()(of_rows) : of_rows;
+  return is_filtered() ? filter()(of_rows) : of_rows;
 }
 
 Eigen::MatrixXd Recording::squared_errors_of_steps(const Eigen::MatrixXd& of_rows) const {
-  if (!goes_through_filter()) return Eigen::MatrixXd::Zero(of_rows.rows(), of_rows.cols());
+  if (!is_filtered()) return Eigen::MatrixXd::Zero(of_rows.rows(), of_rows.cols());
   const RowFilter& every_row = filter();
   return once(known_.errors_of_steps, [&] { return ErrorsOfSteps(every_row, rows_, inputs_.values, inputs_.cutoff); })
       .squares(every_row, of_rows);

@@ -36,16 +36,13 @@ class Recording {
   Recording with_zero_bands(Eigen::VectorXd bands) const;
   /// The same rows at other values of the inputs.
   Recording with_values(Eigen::MatrixXd values) const;
-  /// The same rows, where what is computed does not go through the filter.
-  Recording with_plain_simulation() const;
 
   const Inputs& inputs() const { return inputs_; }
   /// For terms; the simulated output is 0.
   const Rows& rows() const { return rows_; }
   bool is_in_time() const { return inputs_.instants.size() > 0; }
+  /// Whether the measured outputs went through a filter: so do the simulation and the terms.
   bool is_filtered() const { return inputs_.cutoff > 0.0; }
-  /// Whether the simulation and the terms go through the filter of the measured outputs.
-  bool goes_through_filter() const { return is_filtered() && !is_plain_; }
 
   /// Of rows in time. Throws std::invalid_argument for two rows at one time, and where no run has two rows.
   const Pieces& pieces() const;
@@ -55,7 +52,7 @@ class Recording {
 
   /// Of filtered rows.
   const RowFilter& filter() const;
-  /// What is computed at the rows, as the measured outputs are: filtered where it goes_through_filter().
+  /// What is computed at the rows, as the measured outputs are: filtered where it is_filtered().
   Eigen::MatrixXd as_measured(const Eigen::MatrixXd& of_rows) const;
   /// Of filtered rows, see ErrorsOfSteps.
   Eigen::MatrixXd squared_errors_of_steps(const Eigen::MatrixXd& of_rows) const;
@@ -89,7 +86,6 @@ class Recording {
   };
   Inputs inputs_;
   Rows rows_;
-  bool is_plain_ = false;
   mutable Known known_;
 };
 

@@ -193,7 +193,7 @@ RowSplit split_filtered(const Recording& recording, const MissingOptions& option
   RowSplit split;
   split.reach = filter.weights();
   Eigen::VectorXd weights = filter.weights();
-  if (recording.goes_through_filter()) {
+  if (recording.is_filtered()) {
     split.searched.set_crossings(filter.crossings());
     split.held_out.set_crossings(filter.crossings());
   } else {
@@ -278,14 +278,6 @@ void keep(const Samples& from, const Eigen::VectorXd& reach, const std::vector<b
 }
 
 }  // namespace
-
-bool is_plain(const RowSplit& split, const Eigen::MatrixXd& measured, const Eigen::MatrixXd& simulated) {
-  constexpr double clearly = 2.0;
-  const Eigen::MatrixXd y = means_of_filtered(measured, split.searched);
-  const Eigen::VectorXd plain = (y - means_of_filtered(simulated, split.searched)).colwise().squaredNorm();
-  const Eigen::VectorXd filtered = (y - means(simulated, split.searched)).colwise().squaredNorm();
-  return (plain.array() > 0.0).all() && filtered.cwiseQuotient(plain).mean() > clearly;
-}
 
 RowSplit without_rows(const RowSplit& split, const std::vector<bool>& apart) {
   RowSplit result = split;

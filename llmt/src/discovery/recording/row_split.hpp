@@ -17,14 +17,9 @@ struct RowSplit {
   Eigen::Index rows_per_sample = 1;
   double step = 0.0;  ///< median time between rows
   /// Of filtered rows: the weights of the filter of the measured outputs. Next to nothing of a row that does not count
-  /// may be in a sample, whether what is computed goes through the filter or not.
+  /// may be in a sample.
   Eigen::VectorXd reach = {};
 };
-
-/// Whether the simulation is to be taken as it stands at filtered rows, because filtered it leaves more than twice as
-/// much, as a sum of squares, in the mean of the outputs (docs/algorithms/rows-in-time.md, "Filtered rows"). `split`:
-/// without the rows that do not count; `simulated`: n x d at the rows.
-bool is_plain(const RowSplit& split, const Eigen::MatrixXd& measured, const Eigen::MatrixXd& simulated);
 
 /// A row is a sample. Rows of equal inputs, the order aside, keep together.
 RowSplit split_independent(const Inputs& inputs, const MissingOptions& options);
