@@ -50,8 +50,9 @@ Discovery of_robots(Robots robots, const Searched& answer, const Searched& judgi
   remember_held_out_errors(judging.split, judged.improved, robots.improved);
   Discovery result;
   result.held_out = verify(judged, judging.split, answer.lack_of_fit, noise_mm);
-  result.fitted_before = figures({robots.before, {}}, answer.split.searched);
-  result.fitted_after = figures(robots.improved, answer.split.searched);
+  const Measurements kept = without_rows(answer.split.samples, answer.found.investigation.verdict.outliers);
+  result.fitted_before = figures({robots.before, {}}, kept);
+  result.fitted_after = figures(robots.improved, kept);
   result.before = std::move(robots.before);
   result.improved = std::move(robots.improved);
   result.maps = std::move(robots.maps);

@@ -89,6 +89,8 @@ TEST(StrangeData, GrossOutliersDoNotHideAnEffect) {
     std::vector<Eigen::Index> outliers = found.outliers;
     std::ranges::sort(outliers);
     EXPECT_EQ(outliers, (std::vector<Eigen::Index>{5, 17, 23, 30, 31, 41})) << size;
+    EXPECT_LT(found.fitted_before.max, 2.0) << size;  // they are no error of the arm
+    EXPECT_LT(found.fitted_after.max, 0.2) << size;
   }
 }
 

@@ -135,7 +135,7 @@ struct Discovery {
   Robot before;                                   ///< calibrated without what was found
   CorrectedRobot improved;                        ///< with it, and with a correction of the rest where that helps
   bool withdrawn = false;                         ///< something was found, but `improved` is `before`: it was no better
-  ErrorFigures fitted_before;                     ///< of the poses that were searched
+  ErrorFigures fitted_before;                     ///< of the poses that were searched, without the outliers
   ErrorFigures fitted_after;
   HeldOut held_out;
   GapMap gap;                          ///< of `before`
