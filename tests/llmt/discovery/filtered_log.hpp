@@ -50,14 +50,14 @@ struct LogRows {
   MeasuredOutputs measured;
 };
 
-// `torque(t)` is what is measured, with white noise; the encoder has noise of 1e-5 rad.
+// `torque(t)` is what is measured, with white noise, as that of the encoder, in rad.
 inline LogRows rows_of_log(std::uint64_t seed, const Model& model, double noise,
                            const std::function<double(double)>& torque, SignalsOptions options = {.cutoff = 6.0},
-                           const std::function<Eigen::Vector3d(double)>& moved = motion) {
+                           const std::function<Eigen::Vector3d(double)>& moved = motion, double encoder = 1e-5) {
   llmt::Random random(seed);
   Log log;
   log.time = Eigen::VectorXd::LinSpaced(samples, 0.0, static_cast<double>(samples - 1)) / rate;
-  log.positions = log.time.unaryExpr([&](double t) { return moved(t)(0) + 1e-5 * random.normal(); });
+  log.positions = log.time.unaryExpr([&](double t) { return moved(t)(0) + encoder * random.normal(); });
   log.torques = log.time.unaryExpr([&](double t) { return torque(t) + noise * random.normal(); });
   const Signals table = signals(log, options);
   LogRows rows;

@@ -59,19 +59,28 @@ struct StructureLeft {
 /// which T has mean 0 and variance sum w_ij^2 e_i^2 e_j^2. The most significant of all tests.
 ///
 /// In time (`stretches` not empty: labels, samples of one label follow each other) neighbours are samples of different
-/// times, 2 / independent_share apart, because noise is alike in samples that follow each other; and the variance is
-/// larger by 1 / independent_share, because so are the products of pairs.
+/// times, 2 / independent_share apart, because noise is alike in samples that follow each other. The variance is larger
+/// by 1 / independent_share, or by 1 + 2 sum_m r_m^2 with the correlations r_m of e up to three places (Bartlett 1935)
+/// where that is more, because products of pairs that follow each other are alike, too.
 StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors,
                              const std::vector<Eigen::Index>& stretches = {}, double independent_share = 1.0);
 
-/// A signal as the samples beside each sample show it: the mean of those `ceil(1 / independent_share)` places before
-/// and after, of the same stretch; of one where there is one, and the sample's own value where there is none.
+/// A signal as the samples beside each sample show it: the weighted mean of those 1, 2, ... places before and after, of
+/// the same stretch, where there are any, else the sample's own value.
 ///
 /// An error of an input moves the simulation at its sample, and so the deviation there. Samples that the error makes
-/// alike in this input, seen beside the others, then have like deviations though nothing is missing. Samples beside it
-/// have other errors (a lagged value as an instrument: Fuller 1987, section 1.4).
+/// alike in this input, seen beside the others, then have like deviations though nothing is missing. A mean of other
+/// samples has other errors (a lagged value as an instrument: Fuller 1987, section 1.4).
 Eigen::VectorXd between_neighbours(const Eigen::VectorXd& signal, const std::vector<Eigen::Index>& stretches,
-                                   double independent_share);
+                                   const std::vector<double>& weights);
+
+/// Weights of such a mean whose errors are not those of the sample: all on the place ceil(1 / independent_share).
+///
+/// Of filtered rows the errors of speeds and accelerations, of a position with white noise, are alike in neighbouring
+/// samples, with changing sign. With the deviation, which has been through the filter once more, they are correlated by
+/// -.63, .16, .03 (accelerations) and -.41, -.14, .09 (speeds) at 1, 2, 3 places. So up to ceil(1 / independent_share)
+/// = 3 the weights are those of uncorrelated_neighbours(), about .08, .21, .71.
+std::vector<double> weights_of_neighbours(const Recording& recording, double independent_share);
 
 /// Deviations that neighbouring rows share, so that they are not noise, as far as they are material. `errors`: standard
 /// deviations of the errors of the inputs, empty where none are known. In time, neighbours in an input with errors are

@@ -20,10 +20,30 @@ struct Pairing {
     variance += weight * weight * a * a * b * b;
     pairs += weight;
   }
-  double p_value(double independent_share) const {
-    return variance > 0.0 ? 0.5 * std::erfc(sum / std::sqrt(2.0 * variance / independent_share)) : 1.0;
+  double p_value(double inflation) const {
+    return variance > 0.0 ? 0.5 * std::erfc(sum / std::sqrt(2.0 * variance * inflation)) : 1.0;
   }
 };
+
+// The variance of a sum of products of two stretches whose errors are correlated by r_m at m places, as a multiple of
+// that of independent errors: 1 + 2 sum_m r_m^2 (Bartlett 1935). Less what chance adds to r_m^2.
+double inflation_of_products(const Eigen::VectorXd& errors, const std::vector<Eigen::Index>& stretches) {
+  constexpr Eigen::Index most = 3;  // places
+  double inflation = 1.0;
+  for (Eigen::Index m = 1; m <= most && !stretches.empty(); ++m) {
+    double products = 0.0;
+    double squares = 0.0;
+    double pairs = 0.0;
+    for (Eigen::Index i = 0; i + m < errors.size(); ++i) {
+      if (stretches[i] != stretches[i + m]) continue;
+      products += errors(i) * errors(i + m);
+      squares += 0.5 * (errors(i) * errors(i) + errors(i + m) * errors(i + m));
+      pairs += 1.0;
+    }
+    if (squares > 0.0) inflation += 2.0 * std::max(0.0, std::pow(products / squares, 2.0) - 1.0 / pairs);
+  }
+  return inflation;
+}
 
 // Samples whose noise may be alike are no pair.
 class Separate {
@@ -85,6 +105,7 @@ Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors, co
 StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors,
                              const std::vector<Eigen::Index>& stretches, double independent_share) {
   const Separate apart(stretches, independent_share);
+  const double inflation = std::max(1.0 / independent_share, inflation_of_products(errors, stretches));
   constexpr Eigen::Index fewest = 20;
   constexpr double most_work = 2e8;  // distances
   StructureLeft best;
@@ -100,7 +121,7 @@ StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorX
   double tests = 0.0;
   const auto consider = [&](const std::vector<Eigen::Index>& columns, const Pairing& pairing) {
     tests += 1.0;
-    const double p = pairing.p_value(independent_share);
+    const double p = pairing.p_value(inflation);
     if (p >= best.p_value) return;
     const double common = pairing.sum / std::max(1.0, pairing.pairs);
     best = {columns, p, std::clamp(common * static_cast<double>(errors.size()) / errors.squaredNorm(), 0.0, 1.0)};
@@ -121,20 +142,33 @@ StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorX
 }
 
 Eigen::VectorXd between_neighbours(const Eigen::VectorXd& signal, const std::vector<Eigen::Index>& stretches,
-                                   double independent_share) {
-  const auto places = static_cast<Eigen::Index>(std::ceil(1.0 / independent_share));
+                                   const std::vector<double>& weights) {
   Eigen::VectorXd between = signal;
   for (Eigen::Index i = 0; i < signal.size(); ++i) {
     double sum = 0.0;
-    int count = 0;
-    for (const Eigen::Index k : {i - places, i + places}) {
-      if (k < 0 || k >= signal.size() || stretches[k] != stretches[i]) continue;
-      sum += signal(k);
-      ++count;
+    double all = 0.0;
+    for (Eigen::Index place = 1; place <= std::ssize(weights); ++place) {
+      const double weight = weights[static_cast<std::size_t>(place - 1)];
+      for (const Eigen::Index k : {i - place, i + place}) {
+        if (weight == 0.0 || k < 0 || k >= signal.size() || stretches[k] != stretches[i]) continue;
+        sum += weight * signal(k);
+        all += weight;
+      }
     }
-    if (count > 0) between(i) = sum / count;
+    if (all != 0.0) between(i) = sum / all;
   }
   return between;
+}
+
+std::vector<double> weights_of_neighbours(const Recording& recording, double independent_share) {
+  const auto places = static_cast<std::size_t>(std::ceil(1.0 / independent_share));
+  if (recording.is_filtered()) {
+    const Eigen::Vector3d weights = recording.filter().uncorrelated_neighbours();
+    if (std::ssize(weights) >= static_cast<Eigen::Index>(places)) return {weights.begin(), weights.end()};
+  }
+  std::vector<double> at_one_place(places, 0.0);
+  at_one_place.back() = 1.0;
+  return at_one_place;
 }
 
 std::vector<Structure> structure_beside(const TermModel& model, const TermData& data, const Inputs& inputs,
@@ -147,9 +181,10 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
   constexpr double immaterial = 0.01;
   Eigen::MatrixXd samples = means(inputs.values, data.samples);
   if (!data.stretches.empty()) {
+    const std::vector<double> weights = weights_of_neighbours(model.recording(), data.independent_share);
     for (Eigen::Index j = 0; j < errors.size(); ++j) {
       if (!(errors(j) > 0.0)) continue;
-      samples.col(j) = between_neighbours(samples.col(j), data.stretches, data.independent_share);
+      samples.col(j) = between_neighbours(samples.col(j), data.stretches, weights);
     }
   }
   std::vector<Structure> all;

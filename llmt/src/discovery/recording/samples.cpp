@@ -101,6 +101,7 @@ RowFilter::RowFilter(const Rows& rows, const Eigen::MatrixXd& inputs, double cut
     if (k == 0 || !(std::abs(step - step_) < uneven * step_)) pieces_.emplace_back();
     pieces_.back().push_back(rows.sequence[k]);
   }
+  cutoff_ = cutoff;
   stride_ = step_ > 0.0 ? independent_step(cutoff, step_) : 1;
   if (stride_ < 2) {
     refuse("find_missing",
@@ -110,6 +111,10 @@ RowFilter::RowFilter(const Rows& rows, const Eigen::MatrixXd& inputs, double cut
   }
   weights_ = low_pass(cutoff, step_);
   crossings_ = std::make_shared<const std::vector<Crossing>>(crossings_of(inputs, pieces_));
+}
+
+Eigen::Vector3d RowFilter::uncorrelated_neighbours() const {
+  return discovery::uncorrelated_neighbours(cutoff_, step_, stride_);
 }
 
 Eigen::MatrixXd RowFilter::operator()(const Eigen::MatrixXd& of_rows) const {

@@ -115,6 +115,8 @@ class RowFilter {
   /// Rows after which white noise that was filtered counts as independent.
   Eigen::Index stride() const { return stride_; }
   double step() const { return step_; }
+  /// Weights of the means of rows 1, 2 and 3 strides before and after a row, see kernel.hpp.
+  Eigen::Vector3d uncorrelated_neighbours() const;
 
   /// Columns of values at all rows, filtered. At the ends of a piece the weights that are left count.
   Eigen::MatrixXd operator()(const Eigen::MatrixXd& of_rows) const;
@@ -125,6 +127,7 @@ class RowFilter {
   std::shared_ptr<const std::vector<Crossing>> crossings_;
   Eigen::Index stride_ = 1;
   double step_ = 0.0;
+  double cutoff_ = 0.0;
 };
 
 /// The errors of filtered columns where what is computed changes between rows: a third of the change if every other row

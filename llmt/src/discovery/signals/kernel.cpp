@@ -1,5 +1,6 @@
 #include "discovery/signals/kernel.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -80,6 +81,29 @@ Eigen::VectorXd low_pass(double cutoff, double step) {
   for (Eigen::Index k = -half; k <= half; ++k)
     weights(half + k) = kernel_value(static_cast<double>(k) * step / width, 0);
   return weights / weights.sum();
+}
+
+Eigen::Vector3d uncorrelated_neighbours(double cutoff, double step, Eigen::Index stride) {
+  const Kernel kernel = kernel_of(cutoff, step);
+  const Eigen::VectorXd low = low_pass(cutoff, step);
+  const Eigen::Index length = kernel.weights.rows();
+  Eigen::Matrix3d equations;
+  equations.row(0).setOnes();
+  for (Eigen::Index r = 1; r < 3; ++r) {
+    const auto once = kernel.weights.col(r);
+    Eigen::VectorXd twice = Eigen::VectorXd::Zero(length + low.size() - 1);
+    for (Eigen::Index k = 0; k < low.size(); ++k) twice.segment(k, length) += low(k) * once;
+    const auto covariance = [&](Eigen::Index lag) {
+      double sum = 0.0;
+      for (Eigen::Index j = 0; j < length; ++j) {
+        const Eigen::Index place = j + low.size() / 2 + lag;
+        if (place < twice.size()) sum += once(j) * twice(place);
+      }
+      return sum;
+    };
+    for (Eigen::Index m = 0; m < 3; ++m) equations(r, m) = covariance((m + 1) * stride) / covariance(0);
+  }
+  return equations.partialPivLu().solve(Eigen::Vector3d(1.0, 0.0, 0.0));
 }
 
 double correlation_at(const Kernel& kernel, Eigen::Index lag) {

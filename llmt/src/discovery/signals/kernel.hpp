@@ -27,6 +27,11 @@ Kernel kernel_of(double cutoff, double step);
 /// The kernel up to 5 widths, for rows `step` apart; 2 h + 1 weights that add up to 1.
 Eigen::VectorXd low_pass(double cutoff, double step);
 
+/// Three weights of sum 1, of the means of what is `stride`, 2 stride and 3 stride samples before and after one. Taken
+/// of a speed, or of an acceleration, of a position with white noise, the error of this mean is uncorrelated with the
+/// error of the sample itself after it has been through the low pass once more.
+Eigen::Vector3d uncorrelated_neighbours(double cutoff, double step, Eigen::Index stride);
+
 /// Correlation of filtered white noise at a distance of `lag` samples.
 double correlation_at(const Kernel& kernel, Eigen::Index lag);
 
