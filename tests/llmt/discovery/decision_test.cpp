@@ -118,6 +118,17 @@ TEST(Decision, TakesTheFirstRowThatApplies) {
   EXPECT_EQ(noisy.answer, Answer::undecided);
 }
 
+// Parameters that were fitted explain nothing if the rows set aside are worse with them.
+TEST(Decision, ParametersExplainWhatTheyShrinkOnRowsSetAside) {
+  Missing missing;
+  missing.parameters_explain = true;
+  for (const double fitted : {0.9, 1.1}) {
+    missing.gaps = {Gap{.output = "", .before = fitted, .after = fitted, .noise_floor = 1.0, .nominal = 1.0}};
+    decide(missing);
+    EXPECT_EQ(missing.answer, fitted < 1.0 ? Answer::parameters_only : Answer::nothing_missing);
+  }
+}
+
 TEST(Decision, ConfirmsTheTermsOfAnOutputTogether) {
   Missing missing;
   missing.verdict.answer = Answer::named;

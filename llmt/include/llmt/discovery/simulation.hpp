@@ -67,7 +67,8 @@ Simulation linearised(Simulation simulation, const Eigen::MatrixXd& simulated, s
 ///
 /// The answer is parameters_only where nothing is missing and k free parameters gain, with n values of each output o,
 ///   sum_o n ln(RSS_o at the nominal values / RSS_o fitted) - k ln(n d) > 0,
-/// and a likelihood ratio as large as theirs has a probability below SearchOptions::false_alarm_rate in noise.
+/// and a likelihood ratio as large as theirs has a probability below SearchOptions::false_alarm_rate in noise, and the
+/// rows set aside are not worse with them.
 ///
 /// Throws std::invalid_argument for wrong shapes, names or options, values that are not finite, too few rows, inputs
 /// that determine a measured output exactly while they do not determine the simulation (it names them), and a

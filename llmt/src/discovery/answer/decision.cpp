@@ -93,6 +93,19 @@ bool is_certain_state(const FoundTerm& found) {
   return (found.family == "drive_spring" ? first.value : std::abs(first.value)) > certainly * first.standard_error;
 }
 
+// Whether what was fitted leaves at most as much on the rows set aside as the simulation as it was given, `share` of it
+// in squares, in the mean of the outputs that it changes.
+bool leaves_at_most(double share, const Missing& missing) {
+  double outputs = 0.0;
+  double left = 0.0;
+  for (const Gap& gap : missing.gaps) {
+    if (gap.after == gap.nominal) continue;
+    left += gap.nominal > 0.0 ? std::pow(gap.after / gap.nominal, 2.0) : 1.0;
+    outputs += 1.0;
+  }
+  return left <= share * outputs;
+}
+
 struct Ruling {
   bool (*applies)(const Missing&);
   Certainty terms;
@@ -110,7 +123,8 @@ constexpr std::array<Ruling, 12> rulings = {{
     {[](const Missing& missing) { return !missing.structure.empty(); }, Certainty::none, Answer::unknown},
     {[](const Missing& missing) { return is_raised(missing, Reason::known_noise); }, Certainty::none,
      Answer::undecided},
-    {[](const Missing& missing) { return missing.parameters_explain; }, Certainty::none, Answer::parameters_only},
+    {[](const Missing& missing) { return missing.parameters_explain && leaves_at_most(1.0, missing); }, Certainty::none,
+     Answer::parameters_only},
     {[](const Missing& missing) { return is_raised(missing, Reason::drift); }, Certainty::none, Answer::unknown},
     {always, Certainty::none, Answer::nothing_missing},
     {always, Certainty::tentative, Answer::unknown},
@@ -233,22 +247,16 @@ bool is_worse(const Missing& missing) {
 }
 
 bool may_be_applied(const Missing& missing) {
-  double outputs = 0.0;
-  double left = 0.0;
-  for (const Gap& gap : missing.gaps) {
-    if (gap.after == gap.nominal) continue;
-    left += gap.nominal > 0.0 ? std::pow(gap.after / gap.nominal, 2.0) : 1.0;
-    outputs += 1.0;
-  }
+  constexpr double half = 0.5;
   switch (missing.answer) {
     case Answer::nothing_missing:
     case Answer::failed_held_out:
       return false;
     case Answer::parameters_only:  // nothing was added, so the simulation as it was given is what counts
-      return left <= outputs;
+      return leaves_at_most(1.0, missing);
     case Answer::unknown:
     case Answer::undecided:  // what was fitted may stand for what is missing; functions that fit alike do not
-      return !is_worse(missing) && (!(2.0 * left > outputs) || certainty_of(missing) == Certainty::rivalled);
+      return !is_worse(missing) && (leaves_at_most(half, missing) || certainty_of(missing) == Certainty::rivalled);
     default:
       return !is_worse(missing);
   }
