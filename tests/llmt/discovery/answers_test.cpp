@@ -7,7 +7,9 @@
 
 #include "discovery/answer/findings.hpp"
 #include "discovery/answer/judges.hpp"
+#include "discovery/search/replacements.hpp"
 #include "llmt/discovery/simulation.hpp"
+#include "search_cases.hpp"
 
 namespace answers_test {
 namespace {
@@ -83,6 +85,33 @@ TEST(Answers, AWidthIsNotBelowTheErrorsOfItsInput) {
   EXPECT_FALSE(is_too_narrow(0.041, 0.0));
   EXPECT_TRUE(is_too_narrow(0.041, 0.021));
   EXPECT_FALSE(is_too_narrow(0.041, 0.02));
+}
+
+TEST(Answers, OneHingeStandsForAHingeAtTheOtherSideWithALineAndAnOffset) {
+  llmt::Random random(3);
+  constexpr Eigen::Index n = 400;
+  search_cases::Case data;
+  data.evidence.components = 1;
+  data.evidence.jacobian = Eigen::MatrixXd(n, 0);
+  const Eigen::ArrayXd x = Eigen::ArrayXd::LinSpaced(n, -1.0, 1.0);
+  const auto add = [&](const std::string& family, int complexity, const Eigen::ArrayXd& signature) {
+    EffectCandidate candidate;
+    candidate.family = family;
+    candidate.location = family == "offset" ? "" : "x";
+    candidate.signature = signature.matrix();
+    candidate.complexity = complexity;
+    data.candidates.push_back(std::move(candidate));
+  };
+  add("offset", 1, Eigen::ArrayXd::Ones(n));
+  add("linear", 2, x);
+  add("hinge_below", 8, (0.25 - x).max(0.0));
+  add("hinge", 8, (x - 0.25).max(0.0));
+  data.evidence.residuals = 12.0 * data.candidates[3].signature + search_cases::normal_matrix(random, n, 1);
+  SearchOptions options;
+  options.simplest_of_rivals = true;
+  const Workspace workspace(data.evidence, data.candidates, options.absorbed_tolerance);
+  const Scoring scoring(workspace, data.candidates);
+  EXPECT_EQ(least_complex(scoring, {0, 1, 2}, options), Set{3});
 }
 
 }  // namespace

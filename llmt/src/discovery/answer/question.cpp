@@ -83,7 +83,8 @@ class Rivals {
     for (std::size_t k = 0; k < fit.placed.size(); ++k) grounds_.push_back(ground_without(model, kept_, fit, k));
   }
 
-  // Term t in the place of each less simple term of its inputs.
+  // Term t in the place of each less simple term of its inputs; of each as simple as well where one could stand for
+  // several, as a hinge does for a hinge at the other side and a line.
   std::vector<PlacedTerm> options(std::size_t t, Eigen::Index output, const Eigen::MatrixXd& simulated) const {
     std::vector<PlacedTerm> all;
     for (std::size_t k = 0; k < grounds_.size(); ++k) {
@@ -91,13 +92,21 @@ class Rivals {
       const ModelTerm& term = model_->terms()[placed.term];
       const ModelTerm& other = model_->terms()[t];
       if (placed.output != output || term.inputs != other.inputs || placed.term == t) continue;
-      if (other.complexity >= term.complexity) continue;
+      const int limit = is_one_of_several(placed) ? term.complexity : term.complexity - 1;
+      if (other.complexity > limit) continue;
       std::ranges::move(best_constants(*model_, kept_, grounds_[k], t, output, simulated, {}), std::back_inserter(all));
     }
     return all;
   }
 
  private:
+  bool is_one_of_several(const PlacedTerm& placed) const {
+    return std::ranges::any_of(fit_->placed, [&](const PlacedTerm& other) {
+      return other.term != placed.term && other.output == placed.output &&
+             model_->terms()[other.term].inputs == model_->terms()[placed.term].inputs;
+    });
+  }
+
   const TermModel* model_;
   const TermFit* fit_;
   TermData kept_;

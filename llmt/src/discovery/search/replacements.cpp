@@ -113,6 +113,42 @@ int complexity_of(const Scoring& scoring, const Set& set) {
   return most;
 }
 
+int sum_of_complexities(const Scoring& scoring, const Set& set) {
+  int sum = 0;
+  for (const std::size_t a : set) sum += scoring.candidates()[a].complexity;
+  return sum;
+}
+
+// The set without the members that it does better without.
+Explained without_needless(const Scoring& scoring, Explained found) {
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const std::size_t member : found.set) {
+      const Set rest = without(found.set, member);
+      const double score = scoring.score(rest);
+      if (score >= found.score) continue;
+      found = {rest, score};
+      changed = true;
+      break;
+    }
+  }
+  return found;
+}
+
+// Fewer and simpler terms that do better than `set` if another family stands in the place of one: with a hinge at the
+// other side, the line and the offset beside it go. Empty: there are none.
+Set fewer(const Scoring& scoring, const Set& set, const std::string& family, const SearchOptions& options) {
+  for (const std::string& other : causes_of(scoring)) {
+    if (other == family) continue;
+    const Explained rival = without_needless(scoring, replaced(scoring, set, family, other, options));
+    if (rival.set.size() < set.size() && rival.score <= scoring.score(set) &&
+        sum_of_complexities(scoring, rival.set) < sum_of_complexities(scoring, set)) {
+      return rival.set;
+    }
+  }
+  return {};
+}
+
 // The least complex set that predicts the same as `set` with another family in the place of one, or that is a rival of
 // it at the same place if the simplest of rivals is asked for; empty: there is none.
 Set simpler(const Scoring& scoring, const Set& set, const std::string& family, const SearchOptions& options) {
@@ -181,6 +217,7 @@ Set least_complex(const Scoring& scoring, Set set, const SearchOptions& options)
     changed = false;
     for (const std::string& family : families_of(scoring, set)) {
       Set better = simpler(scoring, set, family, options);
+      if (better.empty() && options.simplest_of_rivals) better = fewer(scoring, set, family, options);
       if (better.empty()) continue;
       set = std::move(better);
       changed = true;
