@@ -93,8 +93,8 @@ bool is_certain_state(const FoundTerm& found) {
   return (found.family == "drive_spring" ? first.value : std::abs(first.value)) > certainly * first.standard_error;
 }
 
-// Whether what was fitted leaves at most as much on the rows set aside as the simulation as it was given, `share` of it
-// in squares, in the mean of the outputs that it changes.
+// Whether what was fitted leaves, on the rows set aside, at most `share` of the squares that the simulation as given
+// leaves there: (after / nominal)^2, in the mean of the outputs that it changes.
 bool leaves_at_most(double share, const Missing& missing) {
   double outputs = 0.0;
   double left = 0.0;
@@ -255,7 +255,8 @@ bool may_be_applied(const Missing& missing) {
     case Answer::parameters_only:  // nothing was added, so the simulation as it was given is what counts
       return leaves_at_most(1.0, missing);
     case Answer::unknown:
-    case Answer::undecided:  // what was fitted may stand for what is missing; functions that fit alike do not
+    case Answer::undecided:
+      // May stand for something else, but for functions that fit alike.
       return !is_worse(missing) && (leaves_at_most(half, missing) || certainty_of(missing) == Certainty::rivalled);
     default:
       return !is_worse(missing);
