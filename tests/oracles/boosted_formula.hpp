@@ -52,15 +52,18 @@ inline double sum_at(const llmt::BoostedModel& model, Eigen::Index output, const
   const llmt::BoostedSum& sum = model.sums()[output];
   std::vector<double> z;
   for (const llmt::BoostedFeature& feature : sum.features) {
-    const auto of = [&](int input) { return (x(input) - model.inputs()[input].centre) / model.deviations()[input]; };
-    const std::vector<std::string>& names = model.inputs()[feature.first].levels;
+    const int first = feature.inputs[0];
+    const std::vector<std::string>& names = model.inputs()[first].levels;
     const auto levels = static_cast<double>(names.size());
-    const bool is_empty_level = std::isnan(x(feature.first)) && !names.empty() && names.back().empty();
-    const double level = is_empty_level ? levels - 1.0 : x(feature.first);
+    const bool is_empty_level = std::isnan(x(first)) && !names.empty() && names.back().empty();
+    const double level = is_empty_level ? levels - 1.0 : x(first);
     const double is_level = level < levels ? level == feature.level : std::numeric_limits<double>::quiet_NaN();
-    z.push_back(feature.level >= 0    ? is_level
-                : feature.second >= 0 ? of(feature.first) + feature.sign * of(feature.second)
-                                      : of(feature.first));
+    double of_inputs = 0.0;
+    for (std::size_t k = 0; k < feature.inputs.size(); ++k) {
+      const int input = feature.inputs[k];
+      of_inputs += feature.factors[k] * (x(input) - model.inputs()[input].centre) / model.deviations()[input];
+    }
+    z.push_back(feature.level >= 0 ? is_level : of_inputs);
   }
   double value = 0.0;
   for (const llmt::BoostedTree& tree : sum.trees) value += tree_at(tree, z, blends);

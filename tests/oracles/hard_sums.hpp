@@ -18,7 +18,7 @@ struct ChainOfSum {
   double half_width = 10.0;
   double smallest_share = 0.0;
   bool to_the_left = true;  ///< the side on which the next split lies
-  bool in_pairs = false;    ///< splits on the sum of an input and the next one
+  int together = 1;         ///< a split is on the sum of so many inputs, one after the other, with falling factors
   double slope = 0.0;       ///< of two inputs in each leaf
   double limit = 1.0;       ///< of a leaf's values, on either side
 };
@@ -29,7 +29,12 @@ inline llmt::BoostedModel chain_of_sum(const ChainOfSum& chain) {
   llmt::BoostedSum sum{.base = 0.5, .rate = 0.1, .features = {}, .trees = {}};
   for (int j = 0; j < chain.inputs; ++j) {
     inputs.push_back({.name = "i" + std::to_string(j), .low = -1.0, .high = 1.0});
-    sum.features.push_back({.first = j, .second = chain.in_pairs ? (j + 1) % chain.inputs : -1});
+    llmt::BoostedFeature feature{.inputs = {}, .factors = {}};
+    for (int k = 0; k < chain.together; ++k) {
+      feature.inputs.push_back((j + k) % chain.inputs);
+      feature.factors.push_back(k < 2 ? 1.0 : -1.0 / k);
+    }
+    sum.features.push_back(std::move(feature));
   }
   llmt::BoostedTree tree{.splits = {}, .leaves = {}, .smallest_share = chain.smallest_share};
   for (int k = 0; k < chain.splits; ++k) {
@@ -62,7 +67,11 @@ inline llmt::BoostedModel counting_leaf(int inputs) {
   llmt::BoostedLeaf leaf{.constant = 0.0, .low = 6.4, .high = 6.6};
   for (int j = 0; j < inputs;) {
     const bool is_pair = j < 2 * (inputs - llmt::most_leaf_slopes);
-    sum.features.push_back({.first = j, .second = is_pair ? j + 1 : -1});
+    if (is_pair) {
+      sum.features.push_back({.inputs = {j, j + 1}, .factors = {1.0, 1.0}});
+    } else {
+      sum.features.push_back({.inputs = {j}});
+    }
     leaf.features.push_back(static_cast<int>(leaf.features.size()));
     leaf.slopes.push_back(1.0);
     j += is_pair ? 2 : 1;
@@ -82,7 +91,7 @@ inline void explain_counting_leaf(std::int64_t most_trials) {
 /// A leaf with so many slopes of one input.
 inline llmt::BoostedModel leaf_of_slopes(std::int64_t slopes) {
   llmt::BoostedSum sum;
-  sum.features = {{.first = 0}};
+  sum.features = {{.inputs = {0}}};
   llmt::BoostedLeaf leaf;
   leaf.features.assign(slopes, 0);
   leaf.slopes.assign(slopes, 1.0);

@@ -19,7 +19,8 @@ struct Kind {
   int trees = 4;
   int leaves = 9;
   bool soft = true;
-  double limit = 1.0;  ///< of a leaf's values; infinite: never reached
+  double limit = 1.0;   ///< of a leaf's values; infinite: never reached
+  bool turned = false;  ///< with directions
 };
 
 inline llmt::BoostedTree random_tree(const Kind& kind, int features, llmt::Random& random) {
@@ -55,7 +56,7 @@ inline llmt::BoostedTree random_tree(const Kind& kind, int features, llmt::Rando
   return tree;
 }
 
-/// Four numbers and a category of three levels; pairs of numbers; two outputs.
+/// Four numbers and a category of three levels; pairs of numbers, and directions; two outputs.
 inline llmt::BoostedModel model(const Kind& kind, std::uint64_t seed) {
   llmt::Random random(seed);
   std::vector<llmt::InputColumn> inputs;
@@ -66,15 +67,17 @@ inline llmt::BoostedModel model(const Kind& kind, std::uint64_t seed) {
     input.centre = random.uniform(-0.5, 0.5);
     inputs.push_back(input);
     deviations.push_back(random.uniform(0.5, 2.0));
-    features.push_back({.first = j});
+    features.push_back({.inputs = {j}});
   }
   llmt::InputColumn colour{.name = "colour", .low = 0.0, .high = 2.0};
   colour.levels = {"blue", "green", seed % 2 == 0 ? "" : "red"};  // the last one may be that of missing values
   inputs.push_back(colour);
   deviations.push_back(1.0);
-  for (int level = 0; level < 3; ++level) features.push_back({.first = 4, .level = level});
-  features.push_back({.first = 0, .second = 1, .sign = 1.0});
-  features.push_back({.first = 1, .second = 2, .sign = -1.0});
+  for (int level = 0; level < 3; ++level) features.push_back({.inputs = {4}, .level = level});
+  features.push_back({.inputs = {0, 1}, .factors = {1.0, 1.0}});
+  features.push_back({.inputs = {1, 2}, .factors = {1.0, -1.0}});
+  if (kind.turned) features.push_back({.inputs = {2, 0, 1}, .factors = {0.8, -0.5, 0.3}});
+  if (kind.turned) features.push_back({.inputs = {3, 1}, .factors = {-0.6, 0.8}});
   std::vector<llmt::BoostedSum> sums;
   for (int output = 0; output < 2; ++output) {
     llmt::BoostedSum sum{.base = random.normal(), .rate = 0.3, .features = features, .trees = {}};

@@ -15,7 +15,7 @@ std::string rare_levels_text(const BoostedModel& model) {
   std::string text;
   for (int j = 0; j < static_cast<int>(model.num_inputs()); ++j) {
     const InputColumn& input = model.inputs()[j];
-    const auto is_of_input = [&](const BoostedFeature& feature) { return feature.first == j; };
+    const auto is_of_input = [&](const BoostedFeature& feature) { return feature.inputs.front() == j; };
     const auto with_feature = std::ranges::count_if(model.sums().front().features, is_of_input);
     const auto rare = std::ssize(input.levels) - with_feature;
     if (with_feature == 0 || rare <= 0) continue;

@@ -9,13 +9,13 @@
 namespace llmt::report {
 namespace {
 
-// Numbers of the parts of a sum. A use of a pair, the sum or difference of two inputs, counts for both.
+// Numbers of the parts of a sum. A use of a sum of several inputs counts for each.
 struct Uses {
   Eigen::Index trees = 0;
   Eigen::Index leaves = 0;
   Eigen::Index all_splits = 0;
   Eigen::Index soft_splits = 0;
-  Eigen::Index of_pairs = 0;              // splits
+  Eigen::Index of_several = 0;            // splits
   std::vector<Eigen::Index> splits = {};  // of each input
   std::vector<Eigen::Index> slopes = {};
 };
@@ -25,8 +25,7 @@ Uses uses_of(const BoostedModel& model, const BoostedSum& sum) {
   uses.splits.assign(model.num_inputs(), 0);
   uses.slopes.assign(model.num_inputs(), 0);
   const auto add = [&](std::vector<Eigen::Index>& counts, int feature) {
-    ++counts[sum.features[feature].first];
-    if (sum.features[feature].second >= 0) ++counts[sum.features[feature].second];
+    for (const int input : sum.features[feature].inputs) ++counts[input];
   };
   for (const BoostedTree& tree : sum.trees) {
     ++uses.trees;
@@ -35,7 +34,7 @@ Uses uses_of(const BoostedModel& model, const BoostedSum& sum) {
     for (const BoostedSplit& split : tree.splits) {
       add(uses.splits, split.feature);
       uses.soft_splits += split.half_width > 0.0 ? 1 : 0;
-      uses.of_pairs += sum.features[split.feature].second >= 0 ? 1 : 0;
+      uses.of_several += sum.features[split.feature].inputs.size() > 1 ? 1 : 0;
     }
     for (const BoostedLeaf& leaf : tree.leaves) {
       for (const int feature : leaf.features) add(uses.slopes, feature);
@@ -84,9 +83,9 @@ std::string boosted_inspection_text(const BoostedModel& model, const std::string
     text += table.text(width);
     if (uses.soft_splits > 0)
       text += fmt::format("{} of the splits are soft\n", share(uses.soft_splits, uses.all_splits));
-    if (uses.of_pairs > 0) {
-      text += wrapped(fmt::format("{} of the splits compare the sum or difference of two inputs, and count for both\n",
-                                  share(uses.of_pairs, uses.all_splits)),
+    if (uses.of_several > 0) {
+      text += wrapped(fmt::format("{} of the splits compare a sum of inputs, and count for each of them\n",
+                                  share(uses.of_several, uses.all_splits)),
                       width);
     }
   }
@@ -116,7 +115,7 @@ Json boosted_inspection_json(const BoostedModel& model) {
                             {"leaves", uses.leaves},
                             {"splits", uses.all_splits},
                             {"soft_splits", uses.soft_splits},
-                            {"splits_of_pairs", uses.of_pairs},
+                            {"splits_of_pairs", uses.of_several},
                             {"splits_of_inputs", uses.splits},
                             {"slopes_of_inputs", uses.slopes}});
   }

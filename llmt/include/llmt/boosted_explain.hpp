@@ -27,13 +27,13 @@ struct Attributions {
 /// F the prediction where the inputs in S have the values of the row x and the others those of b: "interventional" SHAP
 /// values (Strumbelj & Kononenko 2014; for trees with constant leaves Lundberg et al. 2020). They add up to
 /// F(x) - mean of F(b) but for rounding, an input that the model does not use gets nothing, and those of a sum are the
-/// sums of those of its trees. Slopes, limits of leaves, soft splits, pairs of inputs and missing values are in it as
+/// sums of those of its trees. Slopes, limits of leaves, soft splits, sums of inputs and missing values are in it as
 /// in BoostedModel::predict().
 ///
 /// Exact: each tree is walked once for x and b together, and what comes to its leaves is integrated as polynomials
-/// (docs/algorithms/explanation.md). Where pairs of inputs, limits of leaves or a smallest_share do not allow that,
-/// inputs are tried one by one, at most Limit::sum_trials times in a tree. The time grows with
-/// the background.
+/// (docs/algorithms/explanation.md). Where sums of inputs, limits of leaves or a smallest_share do not allow that,
+/// inputs are tried one by one, at most Limit::sum_trials times in a tree. A sum with features of more than two inputs
+/// that uses at most ten inputs is predicted for all coalitions S instead. The time grows with the background.
 ///
 /// Throws std::invalid_argument if a number of columns differs, a value is infinite, there is no background, or a tree
 /// needs more trials. Same bytes at any number of threads (0: all). Reports to `progress` after each row of the inputs

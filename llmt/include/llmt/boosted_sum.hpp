@@ -10,13 +10,12 @@
 namespace llmt {
 
 /// A number of each row. Trees split on it, and leaves take it as a regressor. It is a standardised input
-/// z = (x - centre) / deviation, the sum or difference of two, or the indicator (0 or 1) of a level of a categorical
-/// input.
+/// z = (x - centre) / deviation, the sum of several with factors, sum_k factors_k z_k, or the indicator (0 or 1) of a
+/// level of a categorical input. A row that lacks one of the inputs lacks the feature.
 struct BoostedFeature {
-  int first = 0;      ///< index of the input
-  int second = -1;    ///< index of the second input; -1: there is none
-  double sign = 1.0;  ///< of the second input: 1 for the sum, -1 for the difference
-  int level = -1;     ///< index of the level; -1: the feature is a number
+  std::vector<int> inputs = {0};        ///< indices; a level has one
+  std::vector<double> factors = {1.0};  ///< one for each of `inputs`
+  int level = -1;                       ///< index of the level; -1: the feature is a number
 
   bool operator==(const BoostedFeature&) const = default;
 };

@@ -208,8 +208,7 @@ BinnedFeature feature_of(const BoostingData& data, const BoostedFeature& feature
   Eigen::VectorXd values(data.x.rows());
   std::vector<double> row(data.x.cols());  // no other input of it is read
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    row[feature.first] = data.x(i, feature.first);
-    if (feature.second >= 0) row[feature.second] = data.x(i, feature.second);
+    for (const int input : feature.inputs) row[input] = data.x(i, input);
     values(i) = feature_at(feature, data.inputs, data.deviations, row.data());
   }
   return bin_feature(feature, values, data.rows.weights);
@@ -265,9 +264,9 @@ BoostingData boosting_data(const TrainingData& data, const BoostOptions& options
   const Eigen::Index turns = result.regime.takes_turns ? num_parts_of(result.regime, count) : 1;
   for (int part = 0; part < turns; ++part) result.hold_outs.push_back(part_apart(result.parts, part));
   for (int j = 0; j < std::ssize(result.inputs); ++j) {
-    if (!result.inputs[j].is_categorical()) result.rows.features.push_back(feature_of(result, {.first = j}));
+    if (!result.inputs[j].is_categorical()) result.rows.features.push_back(feature_of(result, {.inputs = {j}}));
     for (const int level : levels_with_features(result, j)) {
-      result.rows.features.push_back(feature_of(result, {.first = j, .level = level}));
+      result.rows.features.push_back(feature_of(result, {.inputs = {j}, .level = level}));
     }
   }
   return result;

@@ -286,8 +286,7 @@ BoostedModel model_of(const BoostingData& data, std::vector<BoostedSum> sums, in
   }
   for (BoostedSum& sum : sums) {
     for (BoostedFeature& feature : sum.features) {
-      feature.first = data.columns[feature.first];
-      if (feature.second >= 0) feature.second = data.columns[feature.second];
+      for (int& input : feature.inputs) input = data.columns[input];
     }
     for (SumResiduals& part : sum.held_out) part.spread = with_columns(part.spread, data.columns);
   }

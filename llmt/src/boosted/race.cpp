@@ -5,6 +5,8 @@
 #include <functional>
 #include <utility>
 
+#include "boosted/combined_features.hpp"
+
 namespace llmt {
 namespace {
 
@@ -13,10 +15,12 @@ constexpr int race_rounds = 50;
 constexpr double race_rate = 0.3;
 constexpr std::size_t most_paired = 4;       // inputs whose sums and differences are tried
 constexpr std::size_t most_soft_paired = 6;  // and in soft trees, where these won
-constexpr double allowed_at_first = 1.1;     // of the error: further directions pay only after some hundred rounds
-constexpr double fewest_looked_at = 8.0;     // features with pairs: half of them within these bounds
+constexpr double allowed_at_first = 1.1;     // of the error: further features pay only after some hundred rounds
+constexpr double allowed_when_turned = 1.05;
+constexpr double fewest_looked_at = 8.0;  // features with pairs: half of them within these bounds
 constexpr double most_looked_at = 16.0;
 constexpr const char* of_pairs = " with pairs";
+constexpr const char* of_directions = " with directions";
 constexpr double free_margin = 0.25;  // of 1 / sqrt(held-out rows): by how much a variant must be better
 constexpr double soft_margin = 1.0;
 constexpr double proof = 3.0;  // by so many standard errors of the mean difference of squares
@@ -28,49 +32,6 @@ std::vector<int> some_of(const std::vector<int>& rows, Eigen::Index most) {
   std::vector<int> some;
   for (Eigen::Index k = 0; k < most; ++k) some.push_back(rows[k * all / most]);
   return some;
-}
-
-// How often each feature is used, counted once a level of a symmetric tree.
-std::vector<int> uses_of(const std::vector<GrowingTree>& trees, std::size_t features) {
-  std::vector<int> uses(features, 0);
-  for (const GrowingTree& tree : trees) {
-    std::vector<std::pair<int, int>> seen;
-    for (const GrowingNode& node : tree) {
-      const std::pair<int, int> split = {node.feature, node.cell};
-      if (node.feature < 0 || std::ranges::count(seen, split) > 0) continue;
-      seen.push_back(split);
-      ++uses[node.feature];
-    }
-  }
-  return uses;
-}
-
-// The numeric inputs that symmetric trees use most.
-std::vector<int> most_used(const BinnedRows& rows, const std::vector<GrowingTree>& trees, std::size_t most) {
-  const std::vector<int> uses = uses_of(trees, rows.features.size());
-  std::vector<int> features;
-  for (int k = 0; k < std::ssize(uses); ++k) {
-    if (rows.features[k].feature.level < 0) features.push_back(k);
-  }
-  std::ranges::stable_sort(features, std::greater{}, [&](int k) { return uses[k]; });
-  if (features.size() > most) features.resize(most);
-  std::vector<int> inputs;
-  for (const int k : features) inputs.push_back(rows.features[k].feature.first);
-  std::ranges::sort(inputs);
-  return inputs;
-}
-
-// The rows with the sums and differences of inputs.
-BinnedRows with_pairs(const BoostingData& data, const std::vector<int>& inputs) {
-  BinnedRows rows = data.rows;
-  for (std::size_t i = 0; i < inputs.size(); ++i) {
-    for (std::size_t j = i + 1; j < inputs.size(); ++j) {
-      for (const double sign : {1.0, -1.0}) {
-        rows.features.push_back(feature_of(data, {.first = inputs[i], .second = inputs[j], .sign = sign}));
-      }
-    }
-  }
-  return rows;
 }
 
 // From which rows each run of a variant learns, and on which it is judged.
@@ -138,78 +99,135 @@ SumPlan softened(SumPlan plan, const RoundOptions& usual) {
   return plan;
 }
 
+class Race {
+ public:
+  Race(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, std::uint64_t seed,
+       Work& work)
+      : data_(data),
+        output_(output),
+        usual_(usual),
+        seed_(seed),
+        work_(work),
+        hold_outs_(hold_outs_of(data)),
+        are_few_(data.regime.race == RaceRows::all_parts),
+        best_{usual, "symmetric", data.rows},
+        symmetric_(run_variant(best_)),
+        least_(symmetric_) {}
+
+  SumPlan winner() {
+    const SumPlan first = best_;
+    if (!are_few_) {
+      SumPlan free = best_;
+      free.name = "free";
+      free.rounds.tree.symmetric = false;
+      take_if(std::move(free), is_better_by(free_margin));
+    }
+    take_if(with_constants(best_), is_proven);
+    if (const SumPlan paired = paired_with(most_paired, best_, data_.rows, symmetric_); has_more_features(paired)) {
+      take_if(paired, is_better_by(0.0));
+    }
+    take_if(softened(best_, usual_), is_better_by(soft_margin));
+    if (is_soft()) {
+      const SumPlan paired = paired_with(most_soft_paired, best_, data_.rows, symmetric_);
+      if (has_more_features(paired)) take_if(paired, is_below(allowed_at_first));
+    }
+    turn(first);
+    if (are_few_ && best_.name != first.name && error_at_the_end(first) < error_at_the_end(best_)) best_ = first;
+    best_.compared = std::move(compared_);
+    return std::move(best_);
+  }
+
+ private:
+  using IsBetter = std::function<bool(const Raced&, const Raced&)>;
+
+  const BoostingData& data_;
+  const Eigen::VectorXd& output_;
+  const RoundOptions& usual_;
+  std::uint64_t seed_;
+  Work& work_;
+  std::vector<HoldOut> hold_outs_;
+  bool are_few_;
+  std::vector<BoostVariant> compared_;
+  SumPlan best_;
+  Raced symmetric_;  // symmetric trees, of inputs one by one
+  Raced least_;      // of the best
+
+  bool is_soft() const { return best_.rounds.tree.softness > 0.0; }
+
+  Raced run_variant(const SumPlan& variant) {
+    Work part(work_, 0.2);
+    Raced raced = run(variant, output_, hold_outs_, seed_, part);
+    compared_.push_back({variant.name, raced.rmse});
+    return raced;
+  }
+
+  void take_if(SumPlan variant, const IsBetter& is_better) {
+    Raced raced = run_variant(variant);
+    if (!is_better(raced, least_)) return;
+    least_ = std::move(raced);
+    best_ = std::move(variant);
+  }
+
+  // `margin`: where the rows are many, the share of the error in units of 1 / sqrt(held-out rows).
+  IsBetter is_better_by(double margin) const {
+    return [=, are_few = are_few_](const Raced& one, const Raced& than) {
+      const double noise = 1.0 / std::sqrt(static_cast<double>(one.residuals.size()));
+      return are_few ? is_proven(one, than) : one.rmse < than.rmse * (1.0 - margin * noise);
+    };
+  }
+
+  // `allowed`: where the rows are many, the largest share of the error.
+  IsBetter is_below(double allowed) const {
+    return [=, are_few = are_few_](const Raced& one, const Raced& than) {
+      return are_few ? is_proven(one, than) : one.rmse < allowed * than.rmse;
+    };
+  }
+
+  bool has_more_features(const SumPlan& plan) const { return plan.rows.features.size() > best_.rows.features.size(); }
+
+  double looked_at(const BinnedRows& rows) const {
+    const auto all = static_cast<double>(rows.features.size());
+    const double half = std::clamp(0.5 * all, fewest_looked_at, most_looked_at);
+    return std::min(1.0, std::max(half, static_cast<double>(data_.rows.features.size()) / 4.0) / all);
+  }
+
+  // The plan on `rows` with pairs of what symmetric trees on them use most; as it is without two features of numbers.
+  SumPlan paired_with(std::size_t most, SumPlan plan, const BinnedRows& rows, const Raced& symmetric) const {
+    const std::vector<int> used = most_used(rows, symmetric.trees, most);
+    if (used.size() < 2) return plan;
+    if (!plan.name.ends_with(of_pairs)) plan.name += of_pairs;
+    plan.rows = with_pairs(data_, rows, used);
+    plan.rounds.tree.columns = looked_at(plan.rows);
+    return plan;
+  }
+
+  void turn(const SumPlan& first) {
+    SumPlan crisp = first;
+    crisp.rows = with_directions(data_, symmetric_.trees, least_.trees, best_.rows);
+    if (crisp.rows.features.size() == data_.rows.features.size()) return;
+    crisp.name += of_directions;
+    crisp.rounds.tree.columns = looked_at(crisp.rows);
+    Raced raced = run_variant(crisp);
+    SumPlan soft = softened(paired_with(most_soft_paired, crisp, crisp.rows, raced), usual_);
+    soft.name = std::string("soft") + of_directions;
+    take_if(std::move(soft), is_soft() ? is_below(allowed_when_turned) : is_better_by(soft_margin));
+    if (!is_soft() && is_better_by(soft_margin)(raced, least_)) best_ = std::move(crisp);
+  }
+
+  // A short race judges the start, and long ones of few rows are cheap.
+  double error_at_the_end(const SumPlan& plan) const {
+    const HoldOut& apart = data_.hold_outs.front();
+    Random random(seed_);
+    Work part(work_, 0.5 * work_.left());
+    return boost(plan.rows, output_, apart.train, apart.held_out, {}, plan.rounds, random, part).rmse;
+  }
+};
+
 }  // namespace
 
 SumPlan race(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, std::uint64_t seed,
              Work& work) {
-  const std::vector<HoldOut> hold_outs = hold_outs_of(data);
-  const bool are_few = data.regime.race == RaceRows::all_parts;
-  const std::size_t features = data.rows.features.size();
-  std::vector<BoostVariant> compared;
-  const auto run_variant = [&](const SumPlan& variant) {
-    Work part(work, 0.2);
-    Raced raced = run(variant, output, hold_outs, seed, part);
-    compared.push_back({variant.name, raced.rmse});
-    return raced;
-  };
-  const SumPlan first{usual, "symmetric", data.rows};
-  const Raced symmetric = run_variant(first);
-  SumPlan best = first;
-  Raced least = symmetric;
-  // The same without pairs where there are not two inputs.
-  const auto with_pairs_of = [&](std::size_t most, SumPlan plan) {
-    const std::vector<int> inputs = most_used(data.rows, symmetric.trees, most);
-    if (inputs.size() < 2) return plan;
-    if (!plan.name.ends_with(of_pairs)) plan.name += of_pairs;
-    plan.rows = with_pairs(data, inputs);
-    const auto all = static_cast<double>(plan.rows.features.size());
-    const double half = std::clamp(0.5 * all, fewest_looked_at, most_looked_at);
-    plan.rounds.tree.columns = std::min(1.0, std::max(half, static_cast<double>(features) / 4.0) / all);
-    return plan;
-  };
-  const auto take_if = [&](SumPlan variant, const auto& is_better) {
-    Raced raced = run_variant(variant);
-    if (!is_better(raced, least)) return;
-    least = std::move(raced);
-    best = std::move(variant);
-  };
-  // `margin`: where the rows are many, the share of the error in units of 1 / sqrt(held-out rows).
-  const auto is_better_by = [&](double margin) {
-    return [=](const Raced& one, const Raced& than) {
-      const double noise = 1.0 / std::sqrt(static_cast<double>(one.residuals.size()));
-      return are_few ? is_proven(one, than) : one.rmse < than.rmse * (1.0 - margin * noise);
-    };
-  };
-  if (!are_few) {
-    SumPlan free = best;
-    free.name = "free";
-    free.rounds.tree.symmetric = false;
-    take_if(std::move(free), is_better_by(free_margin));
-  }
-  take_if(with_constants(best), is_proven);
-  if (SumPlan paired = with_pairs_of(most_paired, best); paired.rows.features.size() > features) {
-    take_if(std::move(paired), is_better_by(0.0));
-  }
-  take_if(softened(best, usual), is_better_by(soft_margin));
-  if (best.rounds.tree.softness > 0.0) {
-    SumPlan paired = with_pairs_of(most_soft_paired, best);
-    if (paired.rows.features.size() > best.rows.features.size()) {
-      take_if(std::move(paired), [=](const Raced& one, const Raced& than) {
-        return are_few ? is_proven(one, than) : one.rmse < allowed_at_first * than.rmse;
-      });
-    }
-  }
-  if (are_few && best.name != first.name) {  // a short race judges the start, and long ones of few rows are cheap
-    const HoldOut& apart = data.hold_outs.front();
-    const auto error_at_the_end = [&](const SumPlan& plan) {
-      Random random(seed);
-      Work part(work, 0.5 * work.left());
-      return boost(plan.rows, output, apart.train, apart.held_out, {}, plan.rounds, random, part).rmse;
-    };
-    if (error_at_the_end(first) < error_at_the_end(best)) best = first;
-  }
-  best.compared = std::move(compared);
-  return best;
+  return Race(data, output, usual, seed, work).winner();
 }
 
 }  // namespace llmt

@@ -14,13 +14,13 @@ namespace llmt {
 struct SumPlan {
   RoundOptions rounds;
   std::string name;                         ///< of the variant
-  BinnedRows rows;                          ///< with pairs of features, if these were better
+  BinnedRows rows;                          ///< with pairs and directions, if these were better
   std::vector<BoostVariant> compared = {};  ///< for the standardised output; empty: there was no race
 };
 
 /// The winner among symmetric trees with the options `usual` and their variants, see "The race" in
 /// docs/algorithms/boosting.md: free trees (not where all parts are raced), constants in place of linear models, pairs
-/// of features, soft trees. `output`: standardised.
+/// of features, soft trees, directions. `output`: standardised.
 SumPlan race(const BoostingData& data, const Eigen::VectorXd& output, const RoundOptions& usual, std::uint64_t seed,
              Work& work);
 

@@ -18,8 +18,12 @@ struct @_input {
 };
 
 struct @_feature {
-  int first, second, level; /* second: of a sum or difference, or -1; level: -1 for a number */
-  double sign;
+  int first_part, parts, level; /* level: -1 for a number */
+};
+
+struct @_part {
+  int input;
+  double factor;
 };
 
 struct @_split {
@@ -50,18 +54,20 @@ struct @_output {
 )";
 
 const char* const c_boosted_runtime = R"(
-static double @_standardised(int input, const double *x) {
-  return (x[input] - @_inputs[input].centre) / @_inputs[input].deviation;
-}
-
 static double @_feature_at(const struct @_feature *f, const double *x) {
+  double sum = 0.0;
+  int k;
   if (f->level >= 0) {
-    const double level = x[f->first] == x[f->first] ? x[f->first] : @_inputs[f->first].empty;
-    if (!(level >= 0.0 && level < @_inputs[f->first].levels && level == (double)(int)level)) return NAN;
+    const int input = @_parts[f->first_part].input;
+    const double level = x[input] == x[input] ? x[input] : @_inputs[input].empty;
+    if (!(level >= 0.0 && level < @_inputs[input].levels && level == (double)(int)level)) return NAN;
     return level == (double)f->level ? 1.0 : 0.0;
   }
-  if (f->second < 0) return @_standardised(f->first, x);
-  return @_standardised(f->first, x) + f->sign * @_standardised(f->second, x);
+  for (k = f->first_part; k < f->first_part + f->parts; ++k) {
+    const struct @_input *of = @_inputs + @_parts[k].input;
+    sum += @_parts[k].factor * ((x[@_parts[k].input] - of->centre) / of->deviation);
+  }
+  return sum;
 }
 
 static double @_leaf_at(const struct @_leaf *leaf, const double *z) {
@@ -157,6 +163,7 @@ std::size_t depth_of(const BoostedTree& tree) {
 // The entries of the tables, of all trees of all outputs one after the other.
 struct Entries {
   std::vector<std::string> features;
+  std::vector<std::string> parts;
   std::vector<std::string> splits;
   std::vector<std::string> leaves;
   std::vector<std::string> terms;
@@ -192,8 +199,10 @@ struct Entries {
   void add_sum(const BoostedSum& sum) {
     const std::size_t first_feature = features.size();
     for (const BoostedFeature& feature : sum.features) {
-      features.push_back(fmt::format("{{{}, {}, {}, {}}}", feature.first, feature.second, feature.level,
-                                     Tables::number(feature.sign)));
+      features.push_back(fmt::format("{{{}, {}, {}}}", parts.size(), feature.inputs.size(), feature.level));
+      for (std::size_t k = 0; k < feature.inputs.size(); ++k) {
+        parts.push_back(fmt::format("{{{}, {}}}", feature.inputs[k], Tables::number(feature.factors[k])));
+      }
     }
     outputs.push_back(fmt::format("{{{}, {}, {}, {}}}", roots.size(), sum.trees.size(), Tables::number(sum.base),
                                   Tables::number(sum.rate)));
@@ -227,6 +236,7 @@ CSource to_c(const BoostedModel& model, const std::string& name, const std::stri
   };
   add("inputs", "input", inputs);
   add("features", "feature", entries.features);
+  add("parts", "part", entries.parts);
   add("splits", "split", entries.splits);
   add("leaves", "leaf", entries.leaves);
   add("terms", "term", entries.terms);

@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/checks.hpp"
 #include "base/parallel.hpp"
+#include "explain/coalitions.hpp"
 #include "explain/tree_game.hpp"
 #include "llmt/limits.hpp"
 
@@ -26,17 +29,34 @@ void check_table(const std::string& function, const std::string& argument, const
   check_finite_or_missing(function.c_str(), argument.c_str(), rows);
 }
 
-// For each tree of each sum, the rule that integrates its games.
-std::vector<std::vector<const GameRule*>> rules_of(const BoostedModel& model, std::map<int, GameRule>& rules) {
-  std::vector<std::vector<const GameRule*>> of_sums;
-  for (const BoostedSum& sum : model.sums()) {
-    std::vector<const GameRule*>& of_trees = of_sums.emplace_back();
-    for (const BoostedTree& tree : sum.trees) {
-      const int order = order_for(tree, sum.features);
-      of_trees.push_back(&rules.try_emplace(order, order).first->second);
+// How the contributions to one output are found.
+struct Game {
+  std::vector<const GameRule*> rules = {};  // for each tree the one that integrates its games
+  std::optional<BoostedModel> alone = {};   // the sum by itself: all coalitions of `inputs` are asked for
+  std::vector<int> inputs = {};
+};
+
+// A split on a direction depends on all of its inputs, which a walk through a tree would try one by one, in every tree.
+Game game_of(const BoostedModel& model, std::size_t output, std::map<int, GameRule>& rules) {
+  const BoostedSum& sum = model.sums()[output];
+  Game game;
+  const auto is_of_many = [](const BoostedFeature& feature) { return feature.inputs.size() > 2; };
+  if (std::ranges::any_of(sum.features, is_of_many)) {
+    BoostedModel alone(model.inputs(), {model.outputs()[output]}, model.deviations(), {sum});
+    const std::vector<bool> used = used_inputs(alone);
+    if (std::ranges::count(used, true) <= most_in_coalitions) {
+      for (int input = 0; input < std::ssize(used); ++input) {
+        if (used[input]) game.inputs.push_back(input);
+      }
+      game.alone = std::move(alone);
+      return game;
     }
   }
-  return of_sums;
+  for (const BoostedTree& tree : sum.trees) {
+    const int order = order_for(tree, sum.features);
+    game.rules.push_back(&rules.try_emplace(order, order).first->second);
+  }
+  return game;
 }
 
 [[noreturn]] void refuse(std::size_t output, std::size_t tree) {
@@ -50,10 +70,16 @@ std::vector<std::vector<const GameRule*>> rules_of(const BoostedModel& model, st
 constexpr Eigen::Index pairs_at_once = 32;
 
 // Contributions of a row, outputs x inputs. `rows_of_background`: a column for each row.
-Eigen::MatrixXd contributions_of(const BoostedModel& model, const std::vector<std::vector<const GameRule*>>& rules,
-                                 const Eigen::VectorXd& x, const Eigen::MatrixXd& rows_of_background, Work& work) {
+Eigen::MatrixXd contributions_of(const BoostedModel& model, const std::vector<Game>& games, const Eigen::VectorXd& x,
+                                 const Eigen::MatrixXd& rows_of_background, Work& work) {
   Eigen::MatrixXd contributions(model.num_outputs(), model.num_inputs());
   for (std::size_t o = 0; o < model.sums().size(); ++o) {
+    const auto output = static_cast<Eigen::Index>(o);
+    if (games[o].alone) {
+      work.check();
+      contributions.row(output) = shapley_values(*games[o].alone, games[o].inputs, x, rows_of_background).transpose();
+      continue;
+    }
     const BoostedSum& sum = model.sums()[o];
     Eigen::VectorXd values = Eigen::VectorXd::Zero(model.num_inputs());
     for (Eigen::Index first = 0; first < rows_of_background.cols(); first += pairs_at_once) {
@@ -64,12 +90,11 @@ Eigen::MatrixXd contributions_of(const BoostedModel& model, const std::vector<st
       }
       for (std::size_t k = 0; k < sum.trees.size(); ++k) {
         for (TwoRows& pair : pairs) {
-          if (!pair.add_values(sum.trees[k], *rules[o][k], sum.rate, values)) refuse(o, k);
+          if (!pair.add_values(sum.trees[k], *games[o].rules[k], sum.rate, values)) refuse(o, k);
         }
       }
     }
-    contributions.row(static_cast<Eigen::Index>(o)) =
-        values.transpose() / static_cast<double>(rows_of_background.cols());
+    contributions.row(output) = values.transpose() / static_cast<double>(rows_of_background.cols());
   }
   return contributions;
 }
@@ -87,11 +112,14 @@ Attributions attribute_rows(const BoostedModel& model, const Eigen::Ref<const Ei
       .contributions = {static_cast<std::size_t>(model.num_outputs()), Eigen::MatrixXd(inputs.rows(), inputs.cols())}};
   const Eigen::MatrixXd rows_of_background = background.transpose();
   std::map<int, GameRule> by_order;
-  const std::vector<std::vector<const GameRule*>> rules = rules_of(model, by_order);
+  std::vector<Game> games;
+  for (std::size_t output = 0; output < model.sums().size(); ++output) {
+    games.push_back(game_of(model, output, by_order));
+  }
   Work work(progress);
   parallel_for(inputs.rows(), max_threads, [&](Eigen::Index row) {
     const Eigen::MatrixXd of_row =
-        contributions_of(model, rules, inputs.row(row).transpose(), rows_of_background, work);
+        contributions_of(model, games, inputs.row(row).transpose(), rows_of_background, work);
     for (Eigen::Index o = 0; o < of_row.rows(); ++o) result.contributions[o].row(row) = of_row.row(o);
     work.did(1.0 / static_cast<double>(inputs.rows()));
   });

@@ -10,14 +10,12 @@ int order_for(const BoostedTree& tree, const std::vector<BoostedFeature>& featur
   std::vector<int> uses;  // of each input, on the path
   int inputs = 0;
   const auto use = [&](int input, int change) {
-    if (input < 0) return;
     if (std::ssize(uses) <= input) uses.resize(input + 1, 0);
     inputs += change > 0 ? uses[input] == 0 : -static_cast<int>(uses[input] == 1);
     uses[input] += change;
   };
   const auto use_feature = [&](int feature, int change) {
-    use(features[feature].first, change);
-    use(features[feature].second, change);
+    for (const int input : features[feature].inputs) use(input, change);
   };
   int most_inputs = 0;
   struct Visit {

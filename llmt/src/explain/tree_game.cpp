@@ -71,9 +71,13 @@ bool TwoRows::add_values(const BoostedTree& tree, const GameRule& rule, double s
 // The feature as the inputs have been decided; an input that is the same in both rows is of either.
 double TwoRows::value(int feature) const {
   const auto& [is, of] = features_[feature];
-  if (is.second < 0) return of[inputs_[is.first].side];
-  const auto z = [&](const Input& input) { return input.standardised[input.side]; };
-  return z(inputs_[is.first]) + is.sign * z(inputs_[is.second]);
+  if (is.inputs.size() == 1) return of[inputs_[is.inputs.front()].side];
+  double sum = 0.0;
+  for (std::size_t k = 0; k < is.inputs.size(); ++k) {
+    const Input& input = inputs_[is.inputs[k]];
+    sum += is.factors[k] * input.standardised[input.side];
+  }
+  return sum;
 }
 
 // The open input whose factors changed last.
@@ -81,16 +85,30 @@ int TwoRows::last_open() const {
   return *std::find_if(touched_.rbegin(), touched_.rend(), [&](int input) { return inputs_[input].is_open; });
 }
 
-TwoRows::Values TwoRows::values_of_pair(const BoostedFeature& feature) const {
-  const Input& first = inputs_[feature.first];
-  const Input& second = inputs_[feature.second];
-  Values values;
-  for (int i = first.side; i <= (first.is_open ? 1 : first.side); ++i) {
-    for (int j = second.side; j <= (second.is_open ? 1 : second.side); ++j) {
-      values.z[values.count++] = first.standardised[i] + feature.sign * second.standardised[j];
-    }
+TwoRows::Open TwoRows::open_of(const BoostedFeature& feature) const {
+  Open open;
+  for (const int input : feature.inputs) {
+    if (inputs_[input].is_open && open.count++ == 0) open.first = input;
   }
-  return values;
+  return open;
+}
+
+// None where several inputs are open of which one is missing in a row: then the feature is missing for some of the
+// ways.
+std::optional<TwoRows::Ends> TwoRows::ends_of(const Feature& feature, const Open& open) const {
+  const auto& [is, of] = feature;
+  if (is.inputs.size() == 1) return Ends{{of[0], of[1]}};
+  Ends ends{{0.0, 0.0}};
+  for (std::size_t k = 0; k < is.inputs.size(); ++k) {
+    const auto& [z, differs, is_open, side, factors] = inputs_[is.inputs[k]];
+    if (is_open && open.count > 1 && (std::isnan(z[0]) || std::isnan(z[1]))) return std::nullopt;
+    const double row = is.factors[k] * z[is_open ? 0 : side];
+    const double background = is.factors[k] * z[is_open ? 1 : side];
+    const bool is_turned = open.count > 1 && row > background;
+    ends.z[0] += is_turned ? background : row;
+    ends.z[1] += is_turned ? row : background;
+  }
+  return ends;
 }
 
 // The smallest and the largest share that may come to where the walk is, `share` times the factors so far.
@@ -121,27 +139,28 @@ std::optional<double> TwoRows::right_of(const BoostedSplit& split, double z, dou
 void TwoRows::walk(int at, double share) {
   while (at >= 0) {
     const BoostedSplit& split = tree_->splits[at];
-    const auto& [is, of] = features_[split.feature];
-    const int open = first_open(is);
-    const Values values = open < 0        ? Values{{value(split.feature)}, 1}
-                          : is.second < 0 ? Values{{of[0], of[1]}, 2}
-                                          : values_of_pair(is);
-    double right[4];
-    int known = 0;
-    bool differ = false;
-    for (int k = 0; k < values.count; ++k) {
-      const std::optional<double> found = right_of(split, values.z[k], share);
-      if (!found) break;
-      right[k] = *found;
-      differ = differ || right[k] != right[0];
-      ++known;
+    const Open open = open_of(features_[split.feature].is);
+    const std::optional<Ends> ends =
+        open.count == 0 ? Ends{{value(split.feature), 0.0}} : ends_of(features_[split.feature], open);
+    if (!ends) {
+      decide(open.first, at, share);
+      continue;
     }
-    if (known < values.count) {
+    // What goes to the right grows with the feature, so where both ends agree all values between them do.
+    double right[2];
+    int known = 0;
+    for (; known < (open.count == 0 ? 1 : 2); ++known) {
+      const std::optional<double> found = right_of(split, ends->z[known], share);
+      if (!found) break;
+      right[known] = *found;
+    }
+    const bool differ = known == 2 && right[0] != right[1];
+    if (known < (open.count == 0 ? 1 : 2)) {
       decide(last_open(), at, share);
-    } else if (differ && values.count > 2) {
-      decide(open, at, share);
+    } else if (differ && open.count > 1) {
+      decide(open.first, at, share);
     } else if (differ) {
-      at = branch(split, share, open, {.row = right[0], .background = right[1]});
+      at = branch(split, share, open.first, {.row = right[0], .background = right[1]});
     } else {
       if (right[0] != 0.0 && right[0] != 1.0) {
         tasks_.push_back({Task::Kind::go, split.right, share * right[0], -1, {}});
@@ -287,27 +306,26 @@ int TwoRows::deciding_input(const BoostedLeaf& leaf, double& value) {
   for (std::size_t k = 0; k < leaf.features.size(); ++k) {
     const int feature = leaf.features[k];
     const auto& [is, of] = features_[feature];
-    const int open = first_open(is);
-    if (open < 0) {
+    const Open open = open_of(is);
+    if (open.count == 0) {
       value += leaf.slopes[k] * in_term(leaf, k, this->value(feature));
       continue;
     }
-    if (is.second < 0) {
+    if (is.inputs.size() == 1) {
       const double from = in_term(leaf, k, of[1]);
       value += leaf.slopes[k] * from;
-      change(open, leaf.slopes[k] * (in_term(leaf, k, of[0]) - from));
+      change(open.first, leaf.slopes[k] * (in_term(leaf, k, of[0]) - from));
       continue;
     }
     double sum = 0.0;
-    for (const int input : {is.first, is.second}) {
-      const auto& [z, differs, is_open, side, factors] = inputs_[input];
-      const double factor = input == is.first ? 1.0 : is.sign;
-      sum += factor * z[is_open ? 1 : side];
-      const double by = factor * (z[0] - z[1]);
-      if (is_open && std::isnan(by)) return input;  // missing in one row: the pair is no sum
-      if (is_open) change(input, leaf.slopes[k] * by);
+    for (std::size_t j = 0; j < is.inputs.size(); ++j) {
+      const auto& [z, differs, is_open, side, factors] = inputs_[is.inputs[j]];
+      sum += is.factors[j] * z[is_open ? 1 : side];
+      const double by = is.factors[j] * (z[0] - z[1]);
+      if (is_open && std::isnan(by)) return is.inputs[j];  // missing in one row: the feature is no sum
+      if (is_open) change(is.inputs[j], leaf.slopes[k] * by);
     }
-    if (std::isnan(sum)) return open;
+    if (std::isnan(sum)) return open.first;
     value += leaf.slopes[k] * sum;
   }
   double low = value;

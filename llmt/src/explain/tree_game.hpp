@@ -60,16 +60,21 @@ class TwoRows {
     double of[2];  // if all inputs are of the row, and of the background
   };
 
-  // The values of a feature for each way to take its open inputs: the first of them from the row, then from the
-  // background; within each the second likewise.
-  struct Values {
-    double z[4];
-    int count = 0;
-  };
-
   struct Range {
     double low;
     double high;
+  };
+
+  // The open inputs of a feature: the first of them, -1: none, and how many there are.
+  struct Open {
+    int first = -1;
+    int count = 0;
+  };
+
+  // The values of a feature between which it lies however its open inputs are taken. With one open input: from the row,
+  // and from the background.
+  struct Ends {
+    double z[2];
   };
 
   // What is still to be done: to go on at a node, with other factors of an input (-1: the same), or to go back to the
@@ -83,11 +88,8 @@ class TwoRows {
   };
 
   double value(int feature) const;
-  int first_open(const BoostedFeature& feature) const {
-    if (inputs_[feature.first].is_open) return feature.first;
-    return feature.second >= 0 && inputs_[feature.second].is_open ? feature.second : -1;
-  }
-  Values values_of_pair(const BoostedFeature& feature) const;
+  Open open_of(const BoostedFeature& feature) const;
+  std::optional<Ends> ends_of(const Feature& feature, const Open& open) const;
   Range range_of(double share) const;
   std::optional<double> right_of(const BoostedSplit& split, double z, double share) const;
   int last_open() const;

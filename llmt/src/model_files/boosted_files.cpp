@@ -1,4 +1,5 @@
 // Boosted models as JSON: docs/file-formats.md.
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -12,6 +13,20 @@
 namespace llmt {
 namespace {
 
+// A sum of inputs with factors, which versions before 3 did not have.
+bool is_direction(const BoostedFeature& feature) {
+  if (feature.level >= 0) return false;
+  const bool is_sum =
+      feature.factors.front() == 1.0 &&
+      (feature.factors.size() == 1 || (feature.factors.size() == 2 && std::abs(feature.factors[1]) == 1.0));
+  return !is_sum;
+}
+
+bool has_directions(const BoostedModel& model) {
+  return std::ranges::any_of(model.sums(),
+                             [](const BoostedSum& sum) { return std::ranges::any_of(sum.features, is_direction); });
+}
+
 Json of_input(const InputColumn& input, double deviation) {
   Json json = {{"name", input.name}, {"low", input.low}, {"high", input.high}};
   if (input.is_categorical()) {
@@ -23,10 +38,12 @@ Json of_input(const InputColumn& input, double deviation) {
   return json;
 }
 
+// Single inputs, their sums and their differences as programs before version 3 read them.
 Json of_feature(const BoostedFeature& feature) {
-  Json json = {{"column", feature.first}};
+  if (is_direction(feature)) return {{"columns", feature.inputs}, {"factors", feature.factors}};
+  Json json = {{"column", feature.inputs.front()}};
   if (feature.level >= 0) json["level"] = feature.level;
-  if (feature.second >= 0) json[feature.sign > 0.0 ? "plus_column" : "minus_column"] = feature.second;
+  if (feature.inputs.size() == 2) json[feature.factors[1] > 0.0 ? "plus_column" : "minus_column"] = feature.inputs[1];
   return json;
 }
 
@@ -89,12 +106,14 @@ InputColumn input_from(const JsonReader& json, double& deviation) {
 }
 
 BoostedFeature feature_from(const JsonReader& json) {
-  BoostedFeature feature{.first = json.member("column").as<int>(), .level = json.as("level", -1)};
+  if (json.has("columns")) {
+    return {.inputs = json.member("columns").list<int>(), .factors = json.member("factors").list<double>()};
+  }
+  BoostedFeature feature{.inputs = {json.member("column").as<int>()}, .level = json.as("level", -1)};
   for (const char* key : {"plus_column", "minus_column"}) {
     if (!json.has(key)) continue;
-    feature.second = json.member(key).as<int>();
-    feature.sign = key[0] == 'p' ? 1.0 : -1.0;
-    if (feature.second < 0) json.member(key).fail("it must not be negative");
+    feature.inputs.push_back(json.member(key).as<int>());
+    feature.factors.push_back(key[0] == 'p' ? 1.0 : -1.0);
   }
   return feature;
 }
@@ -168,7 +187,9 @@ void check_boosted_format(const JsonReader& root) {
 }  // namespace
 
 Json json_of(const BoostedModel& model) {
-  Json json = {{"format", boosted_format_name}, {"version", boosted_format_version}};
+  constexpr int without_directions = 2;
+  Json json = {{"format", boosted_format_name},
+               {"version", has_directions(model) ? boosted_format_version : without_directions}};
   json["inputs"] = Json::array();
   for (std::size_t j = 0; j < model.inputs().size(); ++j) {
     json["inputs"].push_back(of_input(model.inputs()[j], model.deviations()[j]));

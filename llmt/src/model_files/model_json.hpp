@@ -21,7 +21,7 @@ inline constexpr int model_format_version_with_empty_levels = 5;
 /// The format of boosted models, which this is no version of. Since version 2 a row may go to both sides of a split
 /// whose feature it lacks.
 inline constexpr const char* boosted_format_name = "llmt-boosted-model";
-inline constexpr int boosted_format_version = 2;
+inline constexpr int boosted_format_version = 3;
 
 /// The format of models of systems that move, whose tree or sum of trees is a member.
 inline constexpr const char* dynamic_format_name = "llmt-dynamic-model";

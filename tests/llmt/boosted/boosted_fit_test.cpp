@@ -53,7 +53,7 @@ TEST(BoostedModel, PredictsTheSumOfItsTreesToTheBit) {
 }
 
 TEST(BoostedModel, BlendsTheSidesOfSoftSplits) {
-  const llmt::BoostedModel model = random_boosted::model({.soft = true}, 1);
+  const llmt::BoostedModel model = random_boosted::model({.soft = true, .turned = true}, 1);
   const Eigen::MatrixXd inputs = random_boosted::rows(200, 1);
   const Eigen::MatrixXd predicted = model.predict(inputs);
   int blends = 0;
@@ -235,6 +235,19 @@ TEST(BoostedFile, KeepsTheSmallestShareOfOneTree) {
   EXPECT_EQ(again.predict(data.inputs), model.predict(data.inputs));
 }
 
+TEST(BoostedFile, HasTheVersionThatKnowsDirectionsOnlyWhereThereAreSome) {
+  const Eigen::MatrixXd inputs = random_boosted::rows(50, 1);
+  for (const bool turned : {false, true}) {
+    const llmt::BoostedModel model = random_boosted::model({.turned = turned}, 1);
+    const std::string text = to_json(model);
+    EXPECT_NE(text.find(turned ? "\"version\":3" : "\"version\":2"), std::string::npos);
+    const llmt::BoostedModel again = llmt::boosted_from_json(text);
+    EXPECT_EQ(again.sums()[0].features, model.sums()[0].features);
+    EXPECT_EQ(again.predict(inputs), model.predict(inputs));
+    EXPECT_EQ(to_json(again), text);
+  }
+}
+
 void expect_fault(const std::string& text, const std::string& words) {
   try {
     llmt::boosted_from_json(text, "file");
@@ -255,14 +268,20 @@ TEST(BoostedFile, SaysWhereItIsWrong) {
     return bad.dump();
   };
   expect_fault(changed("/format", "llmt-model"), "not a file of a boosted model");
-  expect_fault(changed("/version", 3), "version 3 of the format");
+  expect_fault(changed("/version", 4), "version 4 of the format");
   expect_fault(changed("/version", 0), "version 0 of the format");
   expect_fault(changed("/inputs/0/deviation", 0.0), "/inputs/0: deviation is not a positive number");
   expect_fault(changed("/inputs/1/name", "a"), "/inputs/1: its name is there twice");
   expect_fault(changed("/sums/0/rate", 2.0), "/sums/0: rate is not in (0, 1]");
-  expect_fault(changed("/sums/0/features/0/column", 6), "/sums/0/features/0: the first input is no numeric input");
-  expect_fault(changed("/sums/0/features/0/plus_column", good["sums"][0]["features"][0]["column"]),
-               "the second input is no other numeric input");
+  expect_fault(changed("/sums/0/features/0/column", 6), "/sums/0/features/0: 6 is no numeric input");
+  expect_fault(changed("/sums/0/features/0/plus_column", good["sums"][0]["features"][0]["column"]), "is there twice");
+  const auto direction = [&](const std::vector<int>& columns, const std::vector<double>& factors) {
+    return changed("/sums/0/features/0", {{"columns", columns}, {"factors", factors}});
+  };
+  expect_fault(direction({}, {}), "/sums/0/features/0: it has no input");
+  expect_fault(direction({0, 1}, {0.6}), "/sums/0/features/0: not one factor an input");
+  expect_fault(direction({0, 0}, {0.6, 0.8}), "/sums/0/features/0: input 0 is there twice");
+  expect_fault(direction({0, 6}, {0.6, 0.8}), "/sums/0/features/0: 6 is no numeric input");
   expect_fault(changed("/sums/0/trees/0/splits/0/0", 99), "/sums/0/trees/0/splits/0: there is no feature 99");
   expect_fault(changed("/sums/0/trees/0/splits/0/4", 0), "/sums/0/trees/0/splits/0: 0 is no child");
   expect_fault(changed("/sums/0/trees/0/splits/0/4", -2000000000), "is no child");

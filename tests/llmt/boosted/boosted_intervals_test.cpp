@@ -49,7 +49,7 @@ TEST(BoostedModel, HasIntervalsThatHoldTheLevelInEveryFifth) {
 }
 
 TEST(BoostedModel, HasHalfWidthsThatAreOrderStatisticsOfResiduals) {
-  llmt::BoostedSum sum{.base = 1.0, .features = {{.first = 0}}, .trees = {}};
+  llmt::BoostedSum sum{.base = 1.0, .features = {{.inputs = {0}}}, .trees = {}};
   const auto with = [&](std::vector<llmt::SumResiduals> held_out) {
     sum.held_out = std::move(held_out);
     return llmt::BoostedModel({{.name = "x", .low = 0.0, .high = 1.0}}, {{.name = "y", .low = 0.0, .high = 1.0}}, {1.0},

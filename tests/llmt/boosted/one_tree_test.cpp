@@ -197,12 +197,12 @@ TEST(OneTree, IsGrownByTheRuleOfTheSmallerError) {
 TEST(FitBoosted, TriesOneTreeOfManyRowsWhereBoostingStopsEarly) {
   const llmt::BoostResult fitted = llmt::fit_boosted(smooth(5500, 4, 1.0, 8));
   const llmt::BoostSummary& summary = fitted.summaries[0];
-  ASSERT_EQ(summary.compared.size(), 7U);  // five after 50 rounds, and the last two
-  EXPECT_EQ(summary.compared[6].name, "one tree");
-  EXPECT_LT(summary.compared[6].rmse, summary.compared[5].rmse);
+  ASSERT_EQ(summary.compared.size(), 9U);  // seven after 50 rounds, and the last two
+  EXPECT_EQ(summary.compared[8].name, "one tree");
+  EXPECT_LT(summary.compared[8].rmse, summary.compared[7].rmse);
   EXPECT_EQ(summary.variant, "blend");
-  EXPECT_NEAR(summary.compared[5].share + summary.compared[6].share, 1.0, 1e-12);
-  for (int k = 0; k < 5; ++k) EXPECT_EQ(summary.compared[k].share, 0.0);
+  EXPECT_NEAR(summary.compared[7].share + summary.compared[8].share, 1.0, 1e-12);
+  for (int k = 0; k < 7; ++k) EXPECT_EQ(summary.compared[k].share, 0.0);
 }
 
 TEST(FitBoosted, TakesNoTreeWhereTheTruthHasSteps) {

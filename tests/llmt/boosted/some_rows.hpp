@@ -39,7 +39,7 @@ inline Rows some_rows(Eigen::Index count, Eigen::Index features, bool weighted, 
   }
   rows.binned.equal_weights = !weighted;
   for (int j = 0; j < features; ++j) {
-    rows.binned.features.push_back(llmt::bin_feature({.first = j}, rows.z.col(j), rows.binned.weights));
+    rows.binned.features.push_back(llmt::bin_feature({.inputs = {j}}, rows.z.col(j), rows.binned.weights));
   }
   return rows;
 }

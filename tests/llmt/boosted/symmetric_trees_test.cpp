@@ -167,7 +167,7 @@ llmt::BoostedModel some_model(std::vector<llmt::BoostedTree> trees) {
     inputs[k].name = std::string(1, static_cast<char>('a' + k));
     inputs[k].low = -2.0;
     inputs[k].high = 2.0;
-    features.push_back({.first = k});
+    features.push_back({.inputs = {k}});
   }
   llmt::OutputColumn output;
   output.name = "y";

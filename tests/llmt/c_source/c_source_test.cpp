@@ -123,8 +123,11 @@ TEST_F(CSource, FittedModelsWithProductsAndCodesGiveTheBytesOfTheLibrary) {
 }
 
 TEST_F(CSource, SumsOfTreesGiveTheBytesOfTheLibrary) {
-  const std::vector<random_boosted::Kind> kinds = {
-      {.soft = false}, {.trees = 30, .leaves = 40, .soft = true}, {.trees = 3, .leaves = 1}, {.trees = 0}};
+  const std::vector<random_boosted::Kind> kinds = {{.soft = false},
+                                                   {.trees = 30, .leaves = 40, .soft = true},
+                                                   {.trees = 3, .leaves = 1},
+                                                   {.trees = 0},
+                                                   {.trees = 30, .leaves = 40, .turned = true}};
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     Eigen::MatrixXd x = random_boosted::rows(2000, k);
     const llmt::BoostedModel model = random_boosted::model(kinds[k], k);

@@ -23,7 +23,9 @@ TEST(BoostedAttribution, IsTheShapleyValueOfEveryInput) {
                                                    {.soft = true, .limit = no_limit},
                                                    {.soft = true, .limit = 0.7},
                                                    {.leaves = 1},
-                                                   {.leaves = 40, .soft = true, .limit = 2.0}};
+                                                   {.leaves = 40, .soft = true, .limit = 2.0},
+                                                   {.leaves = 1, .turned = true},
+                                                   {.leaves = 40, .soft = true, .limit = 2.0, .turned = true}};
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     const llmt::BoostedModel model = random_boosted::model(kinds[k], 11 + k);
     const Eigen::MatrixXd background = random_boosted::rows(7, 100 + k);
@@ -43,8 +45,8 @@ TEST(BoostedAttribution, IsTheShapleyValueOfEveryInput) {
 // Half the number of inputs that meet in a leaf, rounded up to an even number.
 TEST(BoostedAttribution, TheOrderOfIntegrationFollowsTheInputsThatMeet) {
   std::vector<llmt::BoostedFeature> features;
-  for (int input = 0; input < 12; ++input) features.push_back({.first = input});
-  for (int input = 0; input < 12; input += 2) features.push_back({.first = input, .second = input + 1});
+  for (int input = 0; input < 12; ++input) features.push_back({.inputs = {input}});
+  for (int input = 0; input < 12; input += 2) features.push_back({.inputs = {input, input + 1}, .factors = {1.0, 1.0}});
   const auto order = [&](int split, const std::vector<int>& of_leaf) {
     llmt::BoostedTree tree;
     if (split >= 0) tree.splits = {{.feature = split, .left = -1, .right = -2}};

@@ -119,16 +119,16 @@ TEST(DeepSums, OfTwelveInputsHaveTheirShapleyValues) {
   rows(4, 2) = rows(0, 2);
   for (const double smallest_share : {0.0, 1e-3, 0.08, 0.2}) {
     for (const double slope : {0.0, 0.02, 0.3}) {
-      for (const bool in_pairs : {false, true}) {
+      for (const int together : {1, 2, 3}) {
         const llmt::BoostedModel model =
-            chain_of_sum({.splits = 18, .smallest_share = smallest_share, .in_pairs = in_pairs, .slope = slope});
+            chain_of_sum({.splits = 18, .smallest_share = smallest_share, .together = together, .slope = slope});
         double largest = 0.0;
         for (const int row : {0, 1, 2}) {
           const Eigen::VectorXd x = rows.row(row).transpose();
           const Eigen::MatrixXd expected = oracle::by_all_coalitions(model, x, rows.bottomRows(2));
           const Eigen::MatrixXd found = llmt::attribute(model, x, rows.bottomRows(2)).contributions;
           EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 1e-14)
-              << "smallest_share " << smallest_share << ", slope " << slope << ", pairs " << in_pairs << ", row "
+              << "smallest_share " << smallest_share << ", slope " << slope << ", together " << together << ", row "
               << row;
           largest = std::max(largest, expected.cwiseAbs().maxCoeff());
         }

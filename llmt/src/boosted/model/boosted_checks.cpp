@@ -54,17 +54,19 @@ void check_feature(const BoostedFeature& feature, const std::vector<InputColumn>
     return input >= 0 && input < std::ssize(inputs) && !inputs[input].is_categorical();
   };
   if (feature.level >= 0) {
-    const bool exists = feature.first >= 0 && feature.first < std::ssize(inputs) && feature.second == -1 &&
-                        feature.level < std::ssize(inputs[feature.first].levels);
+    const int input = feature.inputs.size() == 1 ? feature.inputs.front() : -1;
+    const bool exists = input >= 0 && input < std::ssize(inputs) && feature.level < std::ssize(inputs[input].levels);
     if (!exists) fail(pointer, "there is no such level");
     return;
   }
-  if (feature.level != -1 || !is_number(feature.first)) fail(pointer, "the first input is no numeric input");
-  if (feature.second == -1) return;
-  if (!is_number(feature.second) || feature.second == feature.first) {
-    fail(pointer, "the second input is no other numeric input");
+  if (feature.level != -1 || feature.inputs.empty()) fail(pointer, "it has no input");
+  if (feature.factors.size() != feature.inputs.size()) fail(pointer, "not one factor an input");
+  for (std::size_t k = 0; k < feature.inputs.size(); ++k) {
+    const int input = feature.inputs[k];
+    if (!is_number(input)) fail(pointer, fmt::format("{} is no numeric input", input));
+    if (std::ranges::count(feature.inputs, input) > 1) fail(pointer, fmt::format("input {} is there twice", input));
+    if (!std::isfinite(feature.factors[k])) fail(pointer, "a factor is not finite");
   }
-  if (std::abs(feature.sign) != 1.0) fail(pointer, "sign is neither 1 nor -1");
 }
 
 void check_leaf(const BoostedLeaf& leaf, std::size_t features, const std::string& pointer) {

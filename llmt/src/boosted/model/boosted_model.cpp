@@ -155,15 +155,19 @@ void predict_by(const BoostedModel& model, const BoostedSum& sum, const Eigen::R
 double feature_at(const BoostedFeature& feature, std::span<const InputColumn> inputs,
                   std::span<const double> deviations, const double* x) {
   if (feature.level >= 0) {
-    const InputColumn& input = inputs[feature.first];
-    double level = x[feature.first];
+    const InputColumn& input = inputs[feature.inputs.front()];
+    double level = x[feature.inputs.front()];
     if (std::isnan(level) && input.has_empty_level()) level = static_cast<double>(input.levels.size() - 1);
     const bool is_known =
         level >= 0.0 && level < static_cast<double>(input.levels.size()) && level == std::floor(level);
     return is_known ? static_cast<double>(level == feature.level) : std::numeric_limits<double>::quiet_NaN();
   }
-  const auto z = [&](int input) { return (x[input] - inputs[input].centre) / deviations[input]; };
-  return feature.second < 0 ? z(feature.first) : z(feature.first) + feature.sign * z(feature.second);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < feature.inputs.size(); ++k) {
+    const int input = feature.inputs[k];
+    sum += feature.factors[k] * ((x[input] - inputs[input].centre) / deviations[input]);
+  }
+  return sum;
 }
 
 double value_of(const BoostedTree& tree, const double* z) {
@@ -201,8 +205,7 @@ std::vector<bool> used_inputs(const BoostedModel& model) {
   std::vector<bool> used(model.num_inputs(), false);
   for (const BoostedSum& sum : model.sums()) {
     const auto use = [&](int feature) {
-      used[sum.features[feature].first] = true;
-      if (sum.features[feature].second >= 0) used[sum.features[feature].second] = true;
+      for (const int input : sum.features[feature].inputs) used[input] = true;
     };
     for (const BoostedTree& tree : sum.trees) {
       for (const BoostedSplit& split : tree.splits) use(split.feature);
