@@ -88,10 +88,10 @@ struct BoostResult {
 /// | rows from | rate | slopes | c | patience | held out | race | one tree | splits from |
 /// | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 /// | 10 | 0.05 | 3 | 3 | 100 | each fifth in turn | no | RA, to 100 inputs | all rows |
-/// | 500 | 0.05 | 3 | 3 | 200 | a fifth; each for the error | on all fifths | RA or RD, to 100 inputs | all rows |
-/// | 5000 | 0.05 | 5 | 1 | 50 | a fifth | yes | RA, to 32 inputs, 200 trees | all rows |
-/// | 10 000 | 0.07 | 5 | 1 | 50 | a fifth | yes | RA, to 32 inputs, 200 trees | all rows |
-/// | 50 000 | 0.07 | 5 | 1 | 50 | a fifth | yes | none | all rows |
+/// | 500 | 0.05 | 3 | 3 | 200 | a fifth, then all | all fifths, directions | RA or RD, to 100 inputs | all rows |
+/// | 5000 | 0.05 | 5 | 1 | 50 | a fifth | yes, directions | RA, to 32 inputs, 200 trees | all rows |
+/// | 10 000 | 0.07 | 5 | 1 | 50 | a fifth | yes, directions | RA, to 32 inputs, 200 trees | all rows |
+/// | 50 000 | 0.07 | 5 | 1 | 50 | a fifth | yes, directions | none | all rows |
 /// | 100 001 | 0.1 | 5 | 1 | 50 | about 20 000 | yes | none | 250 000 rows |
 ///
 /// Whole groups of rows are held out. The held-out rows decide which trees are taken and when boosting stops. Then the

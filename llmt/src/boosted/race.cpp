@@ -131,7 +131,7 @@ class Race {
       const SumPlan paired = paired_with(most_soft_paired, best_, data_.rows, symmetric_);
       if (has_more_features(paired)) take_if(paired, is_below(allowed_at_first));
     }
-    turn(first);
+    if (data_.regime.directions) turn(first);
     if (are_few_ && best_.name != first.name && error_at_the_end(first) < error_at_the_end(best_)) best_ = first;
     best_.compared = std::move(compared_);
     return std::move(best_);

@@ -34,6 +34,7 @@ struct Regime {
   Eigen::Index held_out = 0;                       ///< about so many rows; 0: a fifth
   bool uses_all_parts = false;                     ///< the printed error is of all fifths, not of the one that chose
   RaceRows race = RaceRows::none;                  ///< on which rows variants are compared after a few rounds
+  bool directions = false;                         ///< variants with directions are among them
   std::span<const GrowthRule> rules_of_tree = {};  ///< by which one tree beside the sum is tried; empty: by none
   Eigen::Index most_inputs_of_tree = 0;            ///< with more none is tried
   Eigen::Index most_rounds_of_tree = no_limit;     ///< and none if the sum has trees of more rounds
@@ -46,12 +47,12 @@ inline constexpr Eigen::Index enough_for_one_hold_out = 500;
 /// docs/algorithms/boosting.md and llmt/boosted.hpp have the same table, and a test compares them. docs/benchmarks.md,
 /// "Sums of trees", says on which data the numbers were chosen.
 inline constexpr std::array<Regime, 6> regimes = {{
-    {fewest_boosted_rows, 0.05, 3, 3.0, 100, true, 0, false, RaceRows::none, by_ra, 100},
-    {enough_for_one_hold_out, 0.05, 3, 3.0, 200, false, 0, true, RaceRows::all_parts, by_ra_or_rd, 100},
-    {5000, 0.05, 5, 1.0, 50, false, 0, false, RaceRows::the_held_out, by_ra, 32, 200},
-    {10000, 0.07, 5, 1.0, 50, false, 0, false, RaceRows::the_held_out, by_ra, 32, 200},
-    {50000, 0.07, 5, 1.0, 50, false, 0, false, RaceRows::the_held_out},
-    {100001, 0.1, 5, 1.0, 50, false, 20000, false, RaceRows::the_held_out, {}, 0, 0, 250000},
+    {fewest_boosted_rows, 0.05, 3, 3.0, 100, true, 0, false, RaceRows::none, false, by_ra, 100},
+    {enough_for_one_hold_out, 0.05, 3, 3.0, 200, false, 0, true, RaceRows::all_parts, true, by_ra_or_rd, 100},
+    {5000, 0.05, 5, 1.0, 50, false, 0, false, RaceRows::the_held_out, true, by_ra, 32, 200},
+    {10000, 0.07, 5, 1.0, 50, false, 0, false, RaceRows::the_held_out, true, by_ra, 32, 200},
+    {50000, 0.07, 5, 1.0, 50, false, 0, false, RaceRows::the_held_out, true},
+    {100001, 0.1, 5, 1.0, 50, false, 20000, false, RaceRows::the_held_out, false, {}, 0, 0, 250000},
 }};
 
 /// The regime of a table, without rules of a tree for too many inputs.

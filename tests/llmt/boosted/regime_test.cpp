@@ -32,9 +32,10 @@ std::string tree_in_words(const llmt::Regime& regime) {
   return fmt::format("{}, to {} inputs{}", rules, regime.most_inputs_of_tree, trees);
 }
 
-std::string race_in_words(llmt::RaceRows rows) {
-  if (rows == llmt::RaceRows::none) return "no";
-  return rows == llmt::RaceRows::all_parts ? "on all fifths" : "yes";
+std::string race_in_words(const llmt::Regime& regime) {
+  if (regime.race == llmt::RaceRows::none) return "no";
+  return std::string(regime.race == llmt::RaceRows::all_parts ? "all fifths" : "yes") +
+         (regime.directions ? ", directions" : "");
 }
 
 std::vector<std::string> table() {
@@ -43,12 +44,12 @@ std::vector<std::string> table() {
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"};
   for (const llmt::Regime& regime : llmt::regimes) {
     const std::string apart = regime.takes_turns      ? "each fifth in turn"
-                              : regime.uses_all_parts ? "a fifth; each for the error"
+                              : regime.uses_all_parts ? "a fifth, then all"
                               : regime.held_out > 0   ? "about " + with_spaces(regime.held_out)
                                                       : "a fifth";
     const std::string searched = regime.searched < llmt::no_limit ? with_spaces(regime.searched) + " rows" : "all rows";
     lines.push_back(fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |", with_spaces(regime.rows), regime.rate,
-                                regime.slopes, regime.ridge, regime.patience, apart, race_in_words(regime.race),
+                                regime.slopes, regime.ridge, regime.patience, apart, race_in_words(regime),
                                 tree_in_words(regime), searched));
   }
   return lines;
