@@ -18,7 +18,7 @@ struct ChainOfSum {
   double half_width = 10.0;
   double smallest_share = 0.0;
   bool to_the_left = true;  ///< the side on which the next split lies
-  int together = 1;         ///< a split is on the sum of so many inputs, one after the other, with falling factors
+  int together = 1;         ///< inputs, one after the other, whose sum a split is on; factors 1, 1, -1/2, -1/3, ...
   double slope = 0.0;       ///< of two inputs in each leaf
   double limit = 1.0;       ///< of a leaf's values, on either side
 };

@@ -26,16 +26,20 @@ std::vector<int> uses_of(const std::vector<GrowingTree>& trees, std::size_t feat
   return uses;
 }
 
-// a + sign b.
+// a + sign b, without inputs that cancel.
 BoostedFeature sum_of(const BoostedFeature& a, const BoostedFeature& b, double sign) {
   BoostedFeature sum = a;
   for (std::size_t k = 0; k < b.inputs.size(); ++k) {
     const auto place = std::ranges::find(sum.inputs, b.inputs[k]);
+    const auto factor = sum.factors.begin() + (place - sum.inputs.begin());
     if (place == sum.inputs.end()) {
       sum.inputs.push_back(b.inputs[k]);
       sum.factors.push_back(sign * b.factors[k]);
+    } else if (*factor + sign * b.factors[k] != 0.0) {
+      *factor += sign * b.factors[k];
     } else {
-      sum.factors[place - sum.inputs.begin()] += sign * b.factors[k];
+      sum.inputs.erase(place);
+      sum.factors.erase(factor);
     }
   }
   return sum;

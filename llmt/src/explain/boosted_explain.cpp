@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -31,8 +31,8 @@ void check_table(const std::string& function, const std::string& argument, const
 
 // How the contributions to one output are found.
 struct Game {
-  std::vector<const GameRule*> rules = {};  // for each tree the one that integrates its games
-  std::optional<BoostedModel> alone = {};   // the sum by itself: all coalitions of `inputs` are asked for
+  std::vector<const GameRule*> rules = {};         // for each tree the one that integrates its games
+  std::shared_ptr<const BoostedModel> alone = {};  // the sum by itself: all coalitions of `inputs` are asked for
   std::vector<int> inputs = {};
 };
 
@@ -42,8 +42,11 @@ Game game_of(const BoostedModel& model, std::size_t output, std::map<int, GameRu
   Game game;
   const auto is_of_many = [](const BoostedFeature& feature) { return feature.inputs.size() > 2; };
   if (std::ranges::any_of(sum.features, is_of_many)) {
-    BoostedModel alone(model.inputs(), {model.outputs()[output]}, model.deviations(), {sum});
-    const std::vector<bool> used = used_inputs(alone);
+    auto alone = model.sums().size() == 1  // models of many trees are large: no copy of one
+                     ? std::shared_ptr<const BoostedModel>(std::shared_ptr<void>(), &model)
+                     : std::make_shared<const BoostedModel>(model.inputs(), std::vector{model.outputs()[output]},
+                                                            model.deviations(), std::vector{sum});
+    const std::vector<bool> used = used_inputs(*alone);
     if (std::ranges::count(used, true) <= most_in_coalitions) {
       for (int input = 0; input < std::ssize(used); ++input) {
         if (used[input]) game.inputs.push_back(input);
@@ -76,8 +79,8 @@ Eigen::MatrixXd contributions_of(const BoostedModel& model, const std::vector<Ga
   for (std::size_t o = 0; o < model.sums().size(); ++o) {
     const auto output = static_cast<Eigen::Index>(o);
     if (games[o].alone) {
-      work.check();
-      contributions.row(output) = shapley_values(*games[o].alone, games[o].inputs, x, rows_of_background).transpose();
+      contributions.row(output) =
+          shapley_values(*games[o].alone, games[o].inputs, x, rows_of_background, work).transpose();
       continue;
     }
     const BoostedSum& sum = model.sums()[o];

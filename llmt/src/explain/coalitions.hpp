@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "llmt/boosted_model.hpp"
+#include "llmt/progress.hpp"
 
 namespace llmt {
 
@@ -14,8 +15,8 @@ inline constexpr int most_in_coalitions = 10;
 
 /// The Shapley values of the inputs in v(S) = mean over the columns b of `background` of F(x_S, b_rest), F the first
 /// output: phi_i = sum over S without i of |S|! (n - |S| - 1)! / n! (v(S + i) - v(S)). `used`: the n inputs that F
-/// depends on, at most most_in_coalitions; the others get 0.
+/// depends on, at most most_in_coalitions; the others get 0. `work`: is asked now and then whether to go on.
 Eigen::VectorXd shapley_values(const BoostedModel& model, const std::vector<int>& used, const Eigen::VectorXd& x,
-                               const Eigen::MatrixXd& background);
+                               const Eigen::MatrixXd& background, Work& work);
 
 }  // namespace llmt

@@ -42,6 +42,17 @@ TEST(BoostedAttribution, IsTheShapleyValueOfEveryInput) {
   }
 }
 
+// Coalitions of a large background are asked for in several parts.
+TEST(BoostedAttribution, OfALargeBackgroundIsTheShapleyValueToo) {
+  const llmt::BoostedModel model = random_boosted::model({.turned = true}, 3);
+  const Eigen::MatrixXd background = random_boosted::rows(300, 4);
+  const Eigen::VectorXd point = random_boosted::rows(1, 5).row(0).transpose();
+  const Eigen::MatrixXd expected = oracle::by_all_coalitions(model, point, background);
+  const Eigen::MatrixXd found = llmt::attribute(model, point, background).contributions;
+  EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_GT(expected.cwiseAbs().maxCoeff(), 0.01);
+}
+
 // Half the number of inputs that meet in a leaf, rounded up to an even number.
 TEST(BoostedAttribution, TheOrderOfIntegrationFollowsTheInputsThatMeet) {
   std::vector<llmt::BoostedFeature> features;

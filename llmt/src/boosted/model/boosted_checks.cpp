@@ -61,10 +61,11 @@ void check_feature(const BoostedFeature& feature, const std::vector<InputColumn>
   }
   if (feature.level != -1 || feature.inputs.empty()) fail(pointer, "it has no input");
   if (feature.factors.size() != feature.inputs.size()) fail(pointer, "not one factor an input");
+  std::set<int> seen;
   for (std::size_t k = 0; k < feature.inputs.size(); ++k) {
     const int input = feature.inputs[k];
     if (!is_number(input)) fail(pointer, fmt::format("{} is no numeric input", input));
-    if (std::ranges::count(feature.inputs, input) > 1) fail(pointer, fmt::format("input {} is there twice", input));
+    if (!seen.insert(input).second) fail(pointer, fmt::format("input {} is there twice", input));
     if (!std::isfinite(feature.factors[k])) fail(pointer, "a factor is not finite");
   }
 }
