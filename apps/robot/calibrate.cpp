@@ -119,6 +119,8 @@ void add_calibrate(CLI::App& app) {
   add_urdf_links(*command, arguments->links);
   add_input_file(*command, "data", task.data_file, "Measurements (CSV with units in the column names)")->required();
   command->add_flag("--correct", options.correct, "Learn the residual as a function of the joint values");
+  command->add_flag("--boost", options.boost, "Learn it with a sum of many small trees, more accurate, in place of one")
+      ->needs("--correct");
   add_folds(*command, options.folds, "Folds of the held-out figures, 0: none");
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows: for paths and grids");
   add_input_file(*command, "--test", task.test_file, "Further measurements that take no part, judged at the end");

@@ -40,7 +40,7 @@ SavedRobot save_corrected(robotics::CorrectedRobot robot, const std::string& pat
     const std::filesystem::path correction = beside(path, correction_extension);
     robot.robot.correction_file = correction.filename().string();
     names.push_back(correction.string());
-    files.push_back({names.back(), to_json(*robot.correction)});
+    files.push_back({names.back(), robotics::to_json(*robot.correction)});
   }
   const bool urdf = robotics::is_urdf(path);
   names.push_back(urdf ? beside(path, ".yaml").string() : path);

@@ -67,7 +67,7 @@ discovery::FoundTerm found_of(const discovery::ModelTerm& term, llmt::Random& ra
 }
 
 Json json_of(const Sample& sample, std::vector<discovery::FoundTerm> found,
-             discovery::Answer answer = discovery::Answer::named) {
+             discovery::Answer answer = discovery::Answer::named, const Eigen::MatrixXd& range_of_terms = {}) {
   TermsSummary summary;
   summary.inputs = sample.inputs.names;
   summary.ranges = ranges_of(sample.inputs);
@@ -76,6 +76,7 @@ Json json_of(const Sample& sample, std::vector<discovery::FoundTerm> found,
   summary.missing.answer = answer;
   summary.missing.gaps = {{.output = "y"}};
   summary.missing.zero_bands = sample.inputs.zero_bands;
+  summary.missing.range_of_terms = range_of_terms;
   return terms_json(summary);
 }
 
@@ -203,6 +204,37 @@ TEST(FoundTerms, OfAnUnknownEffectHoldWhereRowsEnd) {
   EXPECT_LE(largest(code - added(law, held)), 1e-12 * largest(code));
   const program::Outcome failed = folder.run("echo 1 nan 1 1 1 30 0 | ./correct");  // as of a sensor
   EXPECT_NE(failed.out.find("nan"), std::string::npos) << failed.out;
+}
+
+TEST(FoundTerms, AddNoMoreThanWhereTheyWereFoundIfOneIsNotCertain) {
+  if (std::system("command -v cc >/dev/null") != 0) GTEST_SKIP() << "no C compiler";
+  const program::Folder folder;
+  const Sample own = sample();
+  llmt::Random random(4);
+  std::vector<discovery::FoundTerm> two;
+  for (const discovery::ModelTerm& term : discovery::standard_terms(own.inputs)) {
+    const bool is_power = term.family == "linear" || term.family == "square";
+    if (!is_power || term.location != "a") continue;
+    two.push_back(found_of(term, random));
+    two.back().coefficients(0) = two.back().values[0].value = term.family == "square" ? 1.0 : -1.0;
+  }
+  ASSERT_EQ(two.size(), 2U);
+  two[0].confirmed = true;
+  const auto found = [&] {
+    return found_terms(json_of(own, two, discovery::Answer::undecided, Eigen::RowVector2d(-0.1, 0.7)), "found.json");
+  };
+  const auto added = [&](const FoundTerms& terms) {
+    return Eigen::VectorXd(apply(terms, own.inputs.values, own.simulated).col(0) - own.simulated);
+  };
+  const FoundTerms uncertain = found();
+  two[1].confirmed = true;
+  const Eigen::VectorXd all = added(found());
+  ASSERT_LT(all.minCoeff(), -0.2);
+  ASSERT_GT(all.maxCoeff(), 0.8);
+  const Eigen::VectorXd held = all.cwiseMax(-0.1).cwiseMin(0.7);
+  EXPECT_LE(largest(added(uncertain) - held), 1e-12);
+  EXPECT_LE(largest(of_compiled(folder, uncertain, own) - held), 1e-12);
+  EXPECT_NE(correction_code(uncertain, CodeLanguage::python).find("np.clip(terms, -0.1, 0.7)"), std::string::npos);
 }
 
 TEST(ExpressionCode, KeepsTheOrderOfOperators) {

@@ -237,8 +237,9 @@ def test_robot_is_the_same_as_yaml_dict_and_urdf(arm, tmp_path):
     assert repr(arm).startswith("sample arm: 6 joints")
 
 
-def test_a_correction_goes_with_its_robot(arm, measured, tmp_path):
-    corrected = robotics.calibrate(arm, measured, folds=0, correct=True).robot
+@pytest.mark.parametrize("boost", [False, True])
+def test_a_correction_goes_with_its_robot(arm, measured, tmp_path, boost):
+    corrected = robotics.calibrate(arm, measured, folds=0, correct=True, boost=boost).robot
     copy = pickle.loads(pickle.dumps(corrected))
     assert [Path(name).name for name in corrected.save(tmp_path / "cal.yaml")] == ["cal.correction.json", "cal.yaml"]
     expected = corrected.forward(measured[JOINTS])

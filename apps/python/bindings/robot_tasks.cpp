@@ -62,7 +62,7 @@ ReadTest test_reader(const std::optional<Source>& test, const std::vector<std::s
 }
 
 nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<Source>& test, const Reading& reading,
-                   const std::string& made_from, bool correct, int folds, bool contiguous, bool new_session,
+                   const std::string& made_from, bool correct, bool boost, int folds, bool contiguous, bool new_session,
                    bool robust, const std::vector<std::string>& fixed, const std::vector<std::string>& only,
                    const std::map<std::string, double>& priors, int max_leaves, Eigen::Index min_leaf,
                    const std::string& accept_suspicion, double limit_mm, std::uint64_t seed, int threads, bool quality,
@@ -78,13 +78,11 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
                                .accept_suspicion = accept_suspicion,
                                .limit_mm = limit_mm};
   task.options.correct = correct;
+  task.options.boost = boost;
   task.options.folds = folds;
   task.options.kind = contiguous ? FoldKind::contiguous : FoldKind::random;
-  task.options.calibration.fixed = fixed;
-  task.options.calibration.only = only;
-  task.options.calibration.priors = priors;
-  task.options.correction.max_leaves = max_leaves;
-  task.options.correction.min_leaf_samples = min_leaf;
+  task.options.calibration = {.fixed = fixed, .only = only, .priors = priors};
+  task.options.correction = {.max_leaves = max_leaves, .min_leaf_samples = min_leaf};
   task.options.seed = seed;
   task.options.max_threads = threads;
   Outcome outcome(python_face(measured.second));
@@ -325,9 +323,10 @@ nb::dict export_geometry(const Arm& arm, const Arm* nominal, const Arm* origins,
 void add_robot_tasks(nb::module_& module) {
   using nb::arg;
   module.def("calibrate", &calibrate, arg("robot"), arg("measured"), arg("test").none(), arg("reading"), nb::kw_only(),
-             arg("made_from"), arg("correct"), arg("folds"), arg("contiguous"), arg("new_session"), arg("robust"),
-             arg("fixed"), arg("only"), arg("priors"), arg("max_leaves"), arg("min_leaf"), arg("accept_suspicion"),
-             arg("limit_mm"), arg("seed"), arg("threads"), arg("quality"), arg("page"), arg("report").none());
+             arg("made_from"), arg("correct"), arg("boost"), arg("folds"), arg("contiguous"), arg("new_session"),
+             arg("robust"), arg("fixed"), arg("only"), arg("priors"), arg("max_leaves"), arg("min_leaf"),
+             arg("accept_suspicion"), arg("limit_mm"), arg("seed"), arg("threads"), arg("quality"), arg("page"),
+             arg("report").none());
   module.def("discover", &discover, arg("robot"), arg("measured"), arg("test").none(), arg("reading"), nb::kw_only(),
              arg("made_from"), arg("held_out"), arg("folds"), arg("contiguous"), arg("catalogue").none(),
              arg("mass_uncertainty"), arg("accept_suspicion"), arg("seed"), arg("page"), arg("report").none());

@@ -48,7 +48,7 @@ robotics::CorrectedRobot with_correction(robotics::Robot robot, const std::strin
   }
   robot.correction_file.clear();
   robotics::CorrectedRobot corrected{std::move(robot), {}};
-  if (correction) corrected.correction = from_json(*correction, "correction");
+  if (correction) corrected.correction = robotics::correction_from_json(*correction);
   return corrected;
 }
 
@@ -86,7 +86,7 @@ std::string urdf_of(const Arm& arm) {
 }
 
 std::optional<std::string> correction_of(const Arm& arm) {
-  return arm.robot.correction ? std::optional(to_json(*arm.robot.correction)) : std::nullopt;
+  return arm.robot.correction ? std::optional(robotics::to_json(*arm.robot.correction)) : std::nullopt;
 }
 
 // As `llmt-robot calibrate -o`: `correction` and `yaml` stand beside `path` where they are needed.
@@ -96,7 +96,7 @@ std::vector<std::string> save(const Arm& arm, const std::string& path, const std
   robotics::Robot robot = arm.robot.robot;
   robot.correction_file.clear();
   if (arm.robot.correction) {
-    files.push_back({correction, to_json(*arm.robot.correction)});
+    files.push_back({correction, robotics::to_json(*arm.robot.correction)});
     robot.correction_file = correction.substr(correction.find_last_of('/') + 1);
   }
   files.push_back({yaml, robotics::to_yaml(robot)});

@@ -58,6 +58,27 @@ std::string kept_length(const CalibrationReport& report) {
   return "";
 }
 
+Eigen::Index leaves_of(const Model& tree, Eigen::Index output) {
+  Eigen::Index leaves = 0;
+  for (const Partition& partition : tree.partitions()) {
+    if (std::ranges::find(partition.outputs, output) != partition.outputs.end()) leaves += partition.num_leaves();
+  }
+  return leaves;
+}
+
+// "Leaves of the correction: dx_mm 12, dy_mm 8"
+std::string size_sentence(const robotics::Correction& correction) {
+  const auto* tree = std::get_if<Model>(&correction);
+  const std::vector<OutputColumn>& outputs = robotics::outputs_of(correction);
+  std::vector<std::string> sizes;
+  for (std::size_t k = 0; k < outputs.size(); ++k) {
+    const Eigen::Index size = tree != nullptr ? leaves_of(*tree, static_cast<Eigen::Index>(k))
+                                              : std::ssize(std::get<BoostedModel>(correction).sums()[k].trees);
+    sizes.push_back(fmt::format("{} {}", outputs[k].name, size));
+  }
+  return fmt::format("{} of the correction: {}", tree != nullptr ? "Leaves" : "Trees", fmt::join(sizes, ", "));
+}
+
 // What the tables of errors are of, and what was decided by them.
 std::vector<std::string> error_sentences(const CalibrationRun& run) {
   const CalibrationReport& report = run.report;
@@ -74,15 +95,7 @@ std::vector<std::string> error_sentences(const CalibrationRun& run) {
   if (report.folds > 0 && !are_sweeps && !robotics::path_of(run.measurements.poses).empty()) {
     lines.emplace_back("The poses lie along a path: whole stretches of it are held out.");
   }
-  if (report.correction) {
-    std::vector<std::string> leaves;
-    for (const PartitionSummary& partition : report.correction->summary.partitions) {
-      for (const int output : partition.outputs) {
-        leaves.push_back(fmt::format("{} {}", report.correction->model.outputs()[output].name, partition.leaves));
-      }
-    }
-    lines.push_back(fmt::format("Leaves of the correction: {}", fmt::join(leaves, ", ")));
-  }
+  if (report.correction) lines.push_back(size_sentence(*report.correction));
   if (!report.decision.empty()) lines.push_back(report.decision);
   if (!run.used || run.used->outside.empty()) return lines;
   std::vector<std::string> joints;

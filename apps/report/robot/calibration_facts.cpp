@@ -95,7 +95,7 @@ std::vector<JudgedModel> judged_models(const CalibrationReport& report, const ro
   judge(models[0], {placed(report.calibration.registered), std::nullopt}, *test);
   const robotics::Robot calibrated = placed(report.calibration.robot);
   judge(models[1], {calibrated, std::nullopt}, *test);
-  if (report.corrected) judge(models[2], {calibrated, report.correction->model}, *test);
+  if (report.corrected) judge(models[2], {calibrated, report.correction}, *test);
   return models;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <optional>
 #include <stdexcept>
 
 #include "report/terms/found_terms.hpp"
@@ -30,6 +31,7 @@ struct Body {
   std::string adjusted;                                    // what is done to the simulated value first; empty: nothing
   std::vector<std::string> summands;
   std::vector<std::string> titles;
+  std::optional<std::pair<double, double>> range;  // that the sum of the summands is held to
 };
 
 Body body_of(const FoundTerms& found, std::size_t o, CodeLanguage language) {
@@ -41,6 +43,7 @@ Body body_of(const FoundTerms& found, std::size_t o, CodeLanguage language) {
     if (input.zero_band > 0.0) body.zero_bands.emplace_back(input.word, input.zero_band);
     if (found.is_held) body.held.push_back(input);
   }
+  if (output.is_held()) body.range = {output.terms_low, output.terms_high};
   std::vector<std::string> variables = body.arguments;
   variables.push_back(output.word);
   bool uses_output = false;
@@ -110,8 +113,14 @@ std::string c_function(const Body& body) {
   }
   text += fmt::format("  double change = {};\n", body.adjusted.empty() ? "0.0" : body.adjusted);
   if (!body.adjusted.empty()) text += fmt::format("  {} += change;\n", body.arguments.back());
+  const char* const sum = body.range ? "terms" : "change";
+  if (body.range) text += "  double terms = 0.0;\n";
   for (std::size_t k = 0; k < body.summands.size(); ++k) {
-    text += fmt::format("  change += {}; /* {} */\n", body.summands[k], body.titles[k]);
+    text += fmt::format("  {} += {}; /* {} */\n", sum, body.summands[k], body.titles[k]);
+  }
+  if (body.range) {
+    text += fmt::format("  change += terms < {0} ? {0} : terms > {1} ? {1} : terms; /* as far as it was seen */\n",
+                        body.range->first, body.range->second);
   }
   for (const std::string& argument : body.arguments) text += fmt::format("  (void){};\n", argument);
   return text + "  return change;\n}\n";
@@ -128,8 +137,14 @@ std::string python_function(const Body& body) {
   }
   text += fmt::format("    change = {}\n", body.adjusted.empty() ? "0.0" : body.adjusted);
   if (!body.adjusted.empty()) text += fmt::format("    {0} = {0} + change\n", body.arguments.back());
+  const char* const sum = body.range ? "terms" : "change";
+  if (body.range) text += "    terms = 0.0\n";
   for (std::size_t k = 0; k < body.summands.size(); ++k) {
-    text += fmt::format("    change = change + {}  # {}\n", body.summands[k], body.titles[k]);
+    text += fmt::format("    {0} = {0} + {1}  # {2}\n", sum, body.summands[k], body.titles[k]);
+  }
+  if (body.range) {
+    text += fmt::format("    change = change + np.clip(terms, {}, {})  # as far as it was seen\n", body.range->first,
+                        body.range->second);
   }
   return text + "    return change\n";
 }

@@ -223,6 +223,9 @@ FoundTerms found_terms(const Json& json, const std::string& file) {
     }
     for (const Json& output : json.at("outputs")) {
       found.outputs.push_back({output.at("name").get<std::string>(), output.at("word").get<std::string>()});
+      FoundTerms::Output& own = found.outputs.back();
+      own.terms_low = output.value("terms_low", own.terms_low);
+      own.terms_high = output.value("terms_high", own.terms_high);
     }
     check_words(found);
     if (found.outputs.empty()) throw std::runtime_error(fmt::format("{}: there are no outputs", file));
@@ -262,7 +265,7 @@ Eigen::MatrixXd apply(const FoundTerms& found, const Eigen::MatrixXd& inputs, co
     const auto by = derivatives.find(change.parameter);
     if (by != derivatives.end()) base += change.change * by->second;
   }
-  Eigen::MatrixXd corrected = base;
+  Eigen::MatrixXd added = Eigen::MatrixXd::Zero(base.rows(), base.cols());
   for (const FoundTerms::Term& term : found.terms) {
     const auto column = static_cast<Eigen::Index>(term.output);
     Eigen::VectorXd values;
@@ -277,9 +280,13 @@ Eigen::MatrixXd apply(const FoundTerms& found, const Eigen::MatrixXd& inputs, co
             fmt::format("{}: the term {} is not finite at data row {}", found.file, term.title, i + 1));
       }
     }
-    corrected.col(column) += values;
+    added.col(column) += values;
   }
-  return corrected;
+  for (std::size_t o = 0; o < found.outputs.size(); ++o) {
+    const auto column = static_cast<Eigen::Index>(o);
+    added.col(column) = added.col(column).cwiseMax(found.outputs[o].terms_low).cwiseMin(found.outputs[o].terms_high);
+  }
+  return base + added;
 }
 
 std::vector<std::string> outside_sentences(const FoundTerms& found, const Eigen::MatrixXd& inputs) {

@@ -2,6 +2,8 @@
 /// What was found missing, as `llmt discover --json` writes it, read back: applied to other rows, and written as code.
 #pragma once
 
+#include <cmath>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -26,6 +28,10 @@ struct FoundTerms {
     std::string word;     ///< what expressions call its simulated value
     double offset = 0.0;  ///< what the simulation was allowed to adjust: offset + scale * simulated
     double scale = 1.0;
+    /// What all terms add together is held between these: one of them is not certain. Infinite: it is not.
+    double terms_low = -std::numeric_limits<double>::infinity();
+    double terms_high = std::numeric_limits<double>::infinity();
+    bool is_held() const { return std::isfinite(terms_low) || std::isfinite(terms_high); }
   };
   struct Term {
     std::string title;

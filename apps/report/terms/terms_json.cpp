@@ -25,7 +25,7 @@ Words words_of(const TermsSummary& summary) {
 
 std::string number_code(double value) { return value < 0.0 ? fmt::format("({})", value) : fmt::format("{}", value); }
 
-// "0.3*($1 > $c)" with words and numbers in the places of $1, $2, $s, $c, $d; null if there is no expression.
+// "0.3*($1 > $c)" with words and numbers in the places of $1, $2, $s, $c to $e; null if there is no expression.
 Json expression_json(const discovery::FoundTerm& found, const TermsSummary& summary, const Words& words) {
   if (found.code.empty()) return nullptr;
   std::string text;
@@ -41,7 +41,7 @@ Json expression_json(const discovery::FoundTerm& found, const TermsSummary& summ
       const char what = code[++at];
       if (what == 's') {
         text += words.outputs[static_cast<std::size_t>(found.output_index)];
-      } else if (what == 'c' || what == 'd') {
+      } else if (what >= 'c' && what <= 'e') {
         text += number_code(found.constants(what - 'c'));
       } else {
         const std::string& name = found.inputs.at(static_cast<std::size_t>(what - '1'));
@@ -170,6 +170,11 @@ Json outputs_json(const TermsSummary& summary, const Words& words) {
   Json outputs = Json::array();
   for (std::size_t o = 0; o < words.outputs.size(); ++o) {
     outputs.push_back({{"name", summary.missing.gaps[o].output}, {"word", words.outputs[o]}});
+    const Eigen::MatrixXd& range = summary.missing.range_of_terms;
+    if (range.size() == 0 || !discovery::are_terms_held(summary.missing)) continue;
+    const auto row = static_cast<Eigen::Index>(o);
+    outputs.back()["terms_low"] = range(row, 0);
+    outputs.back()["terms_high"] = range(row, 1);
   }
   return outputs;
 }

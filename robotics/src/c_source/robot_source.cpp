@@ -177,9 +177,9 @@ std::string correct(const CorrectedRobot& robot) {
   const Eigen::Matrix3d base = base_rotation_of(robot.robot.chain);
   const CorrectionTwist correction(*robot.correction, robot.robot.chain);
   text += fmt::format("  double error[{}];\n  if (@_tree_predict(q, error) != 0) return;\n",
-                      robot.correction->outputs().size());
-  for (std::size_t k = 0; k < robot.correction->outputs().size(); ++k) {
-    const OutputColumn& seen = robot.correction->outputs()[k];
+                      outputs_of(*robot.correction).size());
+  for (std::size_t k = 0; k < outputs_of(*robot.correction).size(); ++k) {
+    const OutputColumn& seen = outputs_of(*robot.correction)[k];
     const std::size_t place = correction.places()[k];
     const Eigen::Index axis = place % 3;
     text += fmt::format("  error[{0}] = error[{0}] < {1} ? {1} : error[{0}] > {2} ? {2} : error[{0}];\n", k,
@@ -203,8 +203,8 @@ std::string header(const Robot& robot, const std::string& name) {
     text += fmt::format("   q[{}]: joint {}, {}\n", index++, j + 1,
                         robot.chain.joints[j].type == JointType::revolute ? "rad" : "mm");
   }
-  const auto named = [](const std::string& name, const char* what) {
-    return name.empty() ? std::string() : fmt::format(" {} {}", what, name);
+  const auto named = [](const std::string& of, const char* what) {
+    return of.empty() ? std::string() : fmt::format(" {} {}", what, of);
   };
   // A name may hold what ends a comment.
   std::string frames = fmt::format("   Positions are of the{}, in mm, in the frame of the instrument{};\n",
@@ -254,7 +254,8 @@ CSource to_c(const CorrectedRobot& robot, const std::string& name, const std::st
   result.header = header(robot.robot, name);
   if (robot.correction) {
     positions(robot, {.joints = Eigen::MatrixXd(0, std::ssize(robot.robot.chain.joints)), .covariates = {}});  // checks
-    result.source = llmt::to_c(*robot.correction, name + "_tree", header_name).source;
+    const auto source_of = [&](const auto& model) { return llmt::to_c(model, name + "_tree", header_name).source; };
+    result.source = std::visit(source_of, *robot.correction);
     const std::string declared = fmt::format("#include \"{}\"\n", header_name);
     const std::size_t at = result.source.find(declared) + declared.size();
     result.source.insert(at, fmt::format("\nint {}_tree_predict(const double *inputs, double *outputs);\n", name));

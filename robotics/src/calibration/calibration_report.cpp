@@ -16,7 +16,7 @@ namespace {
 
 struct Fitted {
   Calibration calibration;
-  std::optional<FitResult> correction;
+  std::optional<Correction> correction;
 };
 
 Fitted fit_all(const Robot& robot, const Measurements& measurements, const ReportOptions& options, Work& work) {
@@ -24,12 +24,18 @@ Fitted fit_all(const Robot& robot, const Measurements& measurements, const Repor
   work.check();
   if (!options.correct) return fitted;
   const std::vector<double> labels = pose_labels(measurements.poses);
+  if (options.boost) {
+    const BoostOptions boost{.seed = options.seed, .max_threads = options.max_threads};
+    fitted.correction =
+        fit_boosted_correction(fitted.calibration.robot, measurements, boost, labels, work.progress()).model;
+    return fitted;
+  }
   FitOptions fit = options.correction;
   fit.validity = ValidityChoice::crisp;
   fit.folds = {.count = options.correction_folds, .kind = options.kind, .seed = options.seed};
   fit.intervals = false;
   fit.max_threads = options.max_threads;
-  fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit, labels, work.progress());
+  fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit, labels, work.progress()).model;
   return fitted;
 }
 
@@ -44,7 +50,7 @@ Distances distances_of(const Fitted& fitted, const Measurements& measurements) {
   result.nominal = distances(positions(fitted.calibration.registered, measurements.poses), measurements);
   result.geometric = distances(positions(fitted.calibration.robot, measurements.poses), measurements);
   if (fitted.correction) {
-    const CorrectedRobot corrected{fitted.calibration.robot, fitted.correction->model};
+    const CorrectedRobot corrected{fitted.calibration.robot, fitted.correction};
     result.corrected = distances(positions(corrected, measurements.poses), measurements);
   }
   return result;
@@ -135,7 +141,7 @@ ErrorFigures error_figures(const Eigen::VectorXd& distances_mm) {
 
 CorrectedRobot CalibrationReport::best() const {
   CorrectedRobot robot{.robot = calibration.robot, .correction = {}};
-  if (correction_kept) robot.correction = correction->model;
+  if (correction_kept) robot.correction = correction;
   return robot;
 }
 

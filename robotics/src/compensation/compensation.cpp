@@ -174,7 +174,7 @@ std::string outside_of_training(const CorrectedRobot& robot, const Eigen::Vector
   if (!robot.correction) return "";
   std::vector<std::string> names;
   for (Eigen::Index j = 0; j < q.size(); ++j) {
-    const InputColumn& seen = robot.correction->inputs()[j];
+    const InputColumn& seen = inputs_of(*robot.correction)[j];
     if (q(j) >= seen.low && q(j) <= seen.high) continue;
     const Joint& joint = robot.robot.chain.joints[j];
     const double unit = to_limit_unit(joint);

@@ -125,8 +125,9 @@ Eigen::MatrixXd residuals(const Robot& robot, const Measurements& measurements) 
   return world_errors_of(robot, measurements) * base_rotation_of(robot.chain);  // rows: r' R = (R' r)'
 }
 
-FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options,
-                         const std::vector<double>& groups, const Progress& progress) {
+namespace {
+
+TrainingData residual_data(const Robot& robot, const Measurements& measurements, const std::vector<double>& groups) {
   const bool is_plain = measurements.poses.observations.empty();
   const Stands stands =
       is_plain ? Stands{measurements.poses.joints, residuals(robot, measurements)} : stands_of(robot, measurements);
@@ -143,7 +144,21 @@ FitResult fit_correction(const Robot& robot, const Measurements& measurements, c
   data.input_names = correction_inputs(robot.chain);
   data.output_names = names;
   data.may_have_codes = false;  // joint positions that were measured on a grid are no names
-  return fit(data, options, progress);
+  return data;
+}
+
+}  // namespace
+
+FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options,
+                         const std::vector<double>& groups, const Progress& progress) {
+  return fit(residual_data(robot, measurements, groups), options, progress);
+}
+
+BoostResult fit_boosted_correction(const Robot& robot, const Measurements& measurements, const BoostOptions& options,
+                                   const std::vector<double>& groups, const Progress& progress) {
+  BoostOptions own = options;
+  own.mean_of_few = true;
+  return fit_boosted(residual_data(robot, measurements, groups), own, progress);
 }
 
 Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses) {
@@ -181,11 +196,10 @@ CorrectedRobot read_corrected_robot(const std::string& path, const UrdfLinks& li
   if (robot.robot.correction_file.empty()) return robot;
   const std::filesystem::path model = std::filesystem::path(path).parent_path() / robot.robot.correction_file;
   const std::string text = read_file(model.string(), model_limit);
-  // A description may name any file. The message about a file that is no model must not show its content.
-  if (text.find("\"llmt-model\"") == std::string::npos) {
+  if (!is_correction(text)) {
     throw std::runtime_error(fmt::format("{}: correction: {} is no model file", path, model.string()));
   }
-  robot.correction = from_json(text, model.string());
+  robot.correction = correction_from_json(text, model.string());
   try {
     CorrectionTwist(*robot.correction, robot.robot.chain);
   } catch (const std::invalid_argument& error) {

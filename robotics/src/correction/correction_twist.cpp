@@ -10,10 +10,10 @@
 namespace llmt::robotics {
 namespace {
 
-void check_inputs(const Model& model, const Chain& chain) {
+void check_inputs(const Correction& correction, const Chain& chain) {
   std::vector<std::string> inputs;
   bool numbers = true;
-  for (const InputColumn& input : model.inputs()) {
+  for (const InputColumn& input : inputs_of(correction)) {
     inputs.push_back(input.name);
     numbers = numbers && !input.is_categorical();
   }
@@ -39,9 +39,9 @@ Eigen::Matrix3d base_rotation_of(const Chain& chain) {
   return Kinematics(chain).skeleton(any).base_rotation;
 }
 
-CorrectionTwist::CorrectionTwist(const Model& model, const Chain& chain) : model_(model) {
-  check_inputs(model, chain);
-  for (const OutputColumn& output : model.outputs()) {
+CorrectionTwist::CorrectionTwist(const Correction& correction, const Chain& chain) : correction_(correction) {
+  check_inputs(correction, chain);
+  for (const OutputColumn& output : outputs_of(correction)) {
     const auto found = std::ranges::find(correction_outputs, output.name);
     if (found == correction_outputs.end()) {
       throw std::invalid_argument(fmt::format("llmt::robotics: output \"{}\" of the correction is none of {}",
@@ -57,9 +57,10 @@ CorrectionTwist::CorrectionTwist(const Model& model, const Chain& chain) : model
 
 Eigen::MatrixXd CorrectionTwist::at(const Eigen::MatrixXd& joints, int max_threads) const {
   Eigen::MatrixXd twist = Eigen::MatrixXd::Zero(joints.rows(), std::ssize(correction_outputs));
-  const Eigen::MatrixXd predicted = model_.predict(joints, max_threads);
+  const Eigen::MatrixXd predicted =
+      std::visit([&](const auto& model) { return model.predict(joints, max_threads); }, correction_);
   for (std::size_t k = 0; k < places_.size(); ++k) {
-    const OutputColumn& seen = model_.outputs()[k];
+    const OutputColumn& seen = outputs_of(correction_)[k];
     twist.col(places_[k]) = predicted.col(k).cwiseMax(seen.low).cwiseMin(seen.high);
   }
   return twist;

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "llmt/model.hpp"
+#include "llmt/robotics/correction_model.hpp"
 #include "llmt/robotics/kinematics.hpp"
 
 namespace llmt::robotics {
@@ -20,7 +20,7 @@ class CorrectionTwist {
  public:
   /// Throws std::invalid_argument if the inputs are not the chain's joints, or an output is none of
   /// correction_outputs or there twice.
-  CorrectionTwist(const Model& model, const Chain& chain);
+  CorrectionTwist(const Correction& correction, const Chain& chain);
 
   /// Places of the model's outputs in correction_outputs.
   const std::vector<std::size_t>& places() const { return places_; }
@@ -29,7 +29,7 @@ class CorrectionTwist {
   Eigen::MatrixXd at(const Eigen::MatrixXd& joints, int max_threads = 0) const;
 
  private:
-  const Model& model_;
+  const Correction& correction_;
   std::vector<std::size_t> places_;
 };
 

@@ -8,7 +8,9 @@
 #include "discovery/answer/findings.hpp"
 #include "discovery/answer/judges.hpp"
 #include "discovery/search/replacements.hpp"
+#include "discovery/terms/term_model.hpp"
 #include "llmt/discovery/simulation.hpp"
+#include "llmt/discovery/terms.hpp"
 #include "search_cases.hpp"
 
 namespace answers_test {
@@ -112,6 +114,30 @@ TEST(Answers, OneHingeStandsForAHingeAtTheOtherSideWithALineAndAnOffset) {
   const Workspace workspace(data.evidence, data.candidates, options.absorbed_tolerance);
   const Scoring scoring(workspace, data.candidates);
   EXPECT_EQ(least_complex(scoring, {0, 1, 2}, options), Set{3});
+}
+
+// Several terms may cancel where they were fitted and nowhere else.
+TEST(Answers, TermsThatAreNotCertainAddAtMostWhatTheyAddedWhereTheyWereFound) {
+  const Inputs inputs{{"x"}, Eigen::VectorXd::LinSpaced(9, -2.0, 2.0)};
+  const std::vector<ModelTerm> terms = standard_terms(inputs);
+  const auto place = [&](const std::string& family) {
+    return static_cast<std::size_t>(std::ranges::find(terms, family, &ModelTerm::family) - terms.begin());
+  };
+  Missing missing = answer_with(
+      {found_term(place("square"), "square", "x", 1.0, 0.1), found_term(place("linear"), "linear", "x", -1.0, 0.1)});
+  missing.gaps = {{.output = "y"}};
+  missing.searched = {2, 3, 4, 5, 6};  // x of -1 to 1: x^2 - x is -.25 (at .5) to 2
+  const Simulation simulation = tabulated(Eigen::MatrixXd::Zero(9, 1), {"y"});
+  const Recording recording(inputs);
+  missing.parameters = simulation.parameters;
+  missing.range_of_terms = range_of_found_terms(simulation, missing, terms, recording);
+  EXPECT_EQ(missing.range_of_terms(0, 0), -0.25);
+  EXPECT_EQ(missing.range_of_terms(0, 1), 2.0);
+  const Eigen::VectorXd x = inputs.values.col(0);
+  const Eigen::VectorXd added = x.cwiseAbs2() - x;
+  EXPECT_EQ(corrected(simulation, missing, terms, inputs).col(0), added.cwiseMin(2.0));
+  for (FoundTerm& found : missing.found) found.confirmed = true;
+  EXPECT_EQ(corrected(simulation, missing, terms, inputs).col(0), added);
 }
 
 }  // namespace

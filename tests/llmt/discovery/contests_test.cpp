@@ -305,28 +305,33 @@ TEST(Contests, EachAppliesToWhatItLeavesOut) {
   const std::string shape = std::ranges::find_if(log.terms, &ModelTerm::generic)->family;
   EXPECT_EQ(left_out_for(log, log.answer({"square", shape}), regimes)[0], "shapes regimes ");
 
-  // Each of the terms of a tentative answer, then all with a constant. Of several, regimes are tried.
+  // Each of the terms of a tentative answer, then all with a constant. Of several, regimes are tried, then those of x,
+  // with which deviations change their size.
   Missing tentative = log.answer({"square", "saturation"});
   tentative.found[0].confirmed = false;
   EXPECT_EQ(left_out_for(log, tentative, regimes),
-            (Searches{"square regimes ", "saturation regimes ", "saturation regimes ", ""}));
+            (Searches{"square regimes ", "saturation regimes ", "saturation regimes ", "", ""}));
   // Of more than four it is no longer one taken for another.
   tentative = log.answer({"square", "cube", "linear", "offset", "gain"});
   tentative.found[0].confirmed = false;
-  EXPECT_EQ(left_out_for(log, tentative, regimes), Searches{""});
+  EXPECT_EQ(left_out_for(log, tentative, regimes), (Searches{"", ""}));
 
   // Something is left: regimes are no longer left out.
   Missing unknown = log.answer({"square"});
   unknown.answer = Answer::unknown;
-  EXPECT_EQ(left_out_for(log, unknown, regimes), Searches{""});
+  EXPECT_EQ(left_out_for(log, unknown, regimes), (Searches{"", ""}));
   unknown.gaps[0].known_noise = noise;
   EXPECT_EQ(left_out_for(log, unknown, regimes), Searches{});
+  // So they are beside a term that is certain, where more is left than the noise, as far as that is known.
+  Missing certain = log.answer({"square"});
+  certain.gaps[0].known_noise = 0.5 * certain.gaps[0].after;
+  EXPECT_EQ(left_out_for(log, certain, regimes), (Searches{"", ""}));
 
   // A step is an offset in a regime: in its place all terms are tried that act beyond a threshold of its input.
   unknown = log.answer({"step"});
   EXPECT_EQ(left_out_for(log, unknown, regimes), Searches{"saturation regimes "});
   unknown.answer = Answer::unknown;
-  EXPECT_EQ(left_out_for(log, unknown, regimes), (Searches{"saturation regimes ", "", "", ""}));
+  EXPECT_EQ(left_out_for(log, unknown, regimes), (Searches{"saturation regimes ", "", "", "", ""}));
 }
 
 }  // namespace

@@ -112,6 +112,19 @@ TEST_F(RobotCSource, JumpingEffectsTreesPrismaticAndRedundantArmsAreThoseOfTheLi
   }
 }
 
+TEST_F(RobotCSource, ASumOfTreesIsThatOfTheLibrary) {
+  const Robot nominal = with_masses(mdh_like());
+  CorrectedRobot robot{.robot = nominal, .correction = {}};
+  const Poses poses = random_poses(nominal.chain, 300, 8);
+  TrainingData data{.inputs = poses.joints, .outputs = Eigen::MatrixXd(300, 2)};
+  data.outputs.col(0) = (poses.joints.col(0) + poses.joints.col(1)).array().sin();
+  data.outputs.col(1) = 1e-3 * poses.joints.col(2).array().cos();
+  data.input_names = {"q1_rad", "q2_rad", "q3_rad", "q4_rad", "q5_rad", "q6_rad"};
+  data.output_names = {"dz_mm", "dry_rad"};
+  robot.correction = fit_boosted(data, {.max_rounds = 40}).model;
+  EXPECT_LT(compare(robot, nominal, random_poses(nominal.chain, 100, 9), false), bound_ulp);
+}
+
 Robot with_mimic(Robot robot, std::size_t joint, const Mimic& mimic) {
   robot.chain.joints[joint].mimic = mimic;
   return robot;

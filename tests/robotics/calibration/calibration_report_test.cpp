@@ -191,7 +191,7 @@ TEST(Correction, SavedRobotWithItsModelPredictsTheSame) {
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "correction_test";
   std::filesystem::create_directories(folder);
   corrected.robot.correction_file = "model.json";
-  save(*corrected.correction, (folder / "model.json").string());
+  write_file((folder / "model.json").string(), to_json(*corrected.correction));
   save(corrected.robot, (folder / "arm.yaml").string());
   const CorrectedRobot again = read_corrected_robot((folder / "arm.yaml").string());
   EXPECT_EQ(positions(again, seen.poses), positions(corrected, seen.poses));
@@ -219,6 +219,31 @@ TEST(Correction, MustBeAModelOfTheRobotsJoints) {
   CorrectedRobot shorter{truth, right};
   shorter.robot.chain.joints.pop_back();
   EXPECT_THROW(positions(shorter, {seen.poses.joints.leftCols(5), {}}), std::invalid_argument);
+}
+
+// Errors of five joints that add up.
+TEST(Correction, ASumExplainsOnPosesLeftOutMoreThanATree) {
+  const Robot truth = perturbed(mdh_like(), 0.5, 0.05, 1);
+  Measurements seen = measure(truth, random_poses(truth.chain, 300, 2), 0.02, 3);
+  for (Eigen::Index i = 0; i < seen.poses.count(); ++i) {
+    const auto q = [&](Eigen::Index joint) { return seen.poses.joints(i, joint); };
+    for (Eigen::Index joint = 0; joint < 5; ++joint) seen.positions_mm(i, 2) += 0.5 * std::sin(4.0 * q(joint));
+  }
+  const CalibrationReport tree = report_calibration(mdh_like(), seen, {.correct = true, .folds = 2});
+  const CalibrationReport sum = report_calibration(mdh_like(), seen, {.correct = true, .boost = true, .folds = 2});
+  EXPECT_TRUE(sum.correction_kept) << sum.decision;
+  EXPECT_LT(sum.corrected->held_out_mm.mean(), 0.8 * tree.corrected->held_out_mm.mean());
+  const CorrectedRobot best = sum.best();
+  ASSERT_TRUE(best.correction && std::holds_alternative<BoostedModel>(*best.correction));
+  const CorrectedRobot again{best.robot, correction_from_json(to_json(*best.correction))};
+  EXPECT_EQ(positions(again, seen.poses), positions(best, seen.poses));
+  // Each component is held to what was seen.
+  Measurements far = seen;
+  far.poses.joints.array() *= 3.0;
+  far.positions_mm = positions(best, far.poses);
+  EXPECT_LE(residuals(best.robot, far).col(2).maxCoeff(), outputs_of(*best.correction)[2].high + 1e-9);
+  EXPECT_EQ(oracle::thrown<std::runtime_error>([] { correction_from_json("Password: 1234", "secret.txt"); }),
+            "secret.txt is no model");
 }
 
 TEST(Correction, OfAFileThatIsNoModelShowsNothingOfIt) {

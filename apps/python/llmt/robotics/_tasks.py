@@ -112,6 +112,7 @@ def calibrate(
     measured: Any,
     *,
     correct: bool = False,
+    boost: bool = False,
     folds: int = 5,
     contiguous: bool = False,
     test: Any = None,
@@ -144,6 +145,8 @@ def calibrate(
     correct
         Learn the residual as a function of the joint values. The correction is kept if it lowers the mean error on
         poses left out by more than two standard errors of the gain.
+    boost
+        Learn it with a sum of many small trees, more accurate, in place of one.
     folds, contiguous, seed
         Folds of the errors on poses left out, 0: none; blocks of consecutive rows; seed of the random folds.
     test, new_session
@@ -181,6 +184,8 @@ def calibrate(
     """
     if new_session and test is None:
         raise ValueError("new_session is about test, which is not given")
+    if boost and not correct:
+        raise ValueError("boost is about correct, which is not asked for")
     arguments = dict(locals())
     arm = _robot_of(robot)
     given = _checked(source_of(measured, "measured"), columns, arm)
@@ -202,6 +207,7 @@ def calibrate(
             },
         ),
         correct=bool(correct),
+        boost=bool(boost),
         folds=_folds(folds),
         contiguous=bool(contiguous),
         new_session=bool(new_session),

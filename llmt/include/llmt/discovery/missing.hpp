@@ -206,6 +206,8 @@ struct Missing {
   /// n x d, or empty: roots of the weights of rows where errors of the inputs make some less certain than others. Gaps,
   /// noise floors and known noise are weighted root mean squares.
   Eigen::MatrixXd weights;
+  /// d x 2: the least and the largest that all terms found add together at a row searched or set aside.
+  Eigen::MatrixXd range_of_terms;
   Eigen::VectorXd zero_bands;  ///< p, or empty: within them an input is at rest and counts as 0, Inputs::zero_bands
   std::vector<Eigen::Index> failing_rows;  ///< set aside, where the terms make the error grow most; if that failed
   int rounds = 0;
@@ -226,5 +228,9 @@ bool is_worse(const Missing& missing);
 /// Gap::after^2 / nominal^2 at most half their number. Not so where the only objection is that other functions explain
 /// the rows alike (Reason::rival). Changes of parameters where nothing is missing may not be added.
 bool may_be_applied(const Missing& missing);
+
+/// Whether one of the terms found is not certain. Such terms are fitted functions, no laws: several may cancel where
+/// they were fitted and nowhere else, so at other rows they add at most what they added there, Missing::range_of_terms.
+bool are_terms_held(const Missing& missing);
 
 }  // namespace llmt::discovery

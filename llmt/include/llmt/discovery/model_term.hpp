@@ -67,7 +67,7 @@ struct ModelTerm {
   int complexity = 0;
   /// Added to the score: how much better a term must explain that contains simpler ones or comes close to them.
   double prior_cost = 0.0;
-  /// k expressions, one for each column, in the language of muParser: $1 and $2 stand for `inputs`, $c and $d
+  /// k expressions, one for each column, in the language of muParser: $1 and $2 stand for `inputs`, $c to $e
   /// for the constants, $s for the simulated output. Empty: there are none, as for terms of the row before.
   std::vector<std::string> code = {};
 };

@@ -97,7 +97,8 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
                               const MeasuredOutputs& measured, const std::vector<ModelTerm>& terms,
                               const MissingOptions& options = {});
 
-/// The simulation with what was found, at other inputs; m x d. `terms` as given to find_missing().
+/// The simulation with what was found, at other inputs; m x d. `terms` as given to find_missing(). If one of the terms
+/// found is not certain, what they add together is held to Missing::range_of_terms.
 Eigen::MatrixXd corrected(const Simulation& simulation, const Missing& missing, const std::vector<ModelTerm>& terms,
                           const Inputs& inputs);
 

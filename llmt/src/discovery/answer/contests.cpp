@@ -1,12 +1,8 @@
 #include "discovery/answer/contests.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
-#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -87,43 +83,26 @@ Missing with_rival(Missing found, const Missing& other, std::optional<Reason> ob
   return found;
 }
 
-template <class Test>
-Left with(Left left, const Terms& terms, Test test) {
-  for (std::size_t t = 0; t < terms.size(); ++t) {
-    if (test(terms[t])) left.insert(t);
-  }
-  return left;
-}
-
-// What a contest searches, but for the terms left out.
-struct Others {
-  Terms terms;
-  Left left_out;
-};
-
-// Each is searched by itself, and meets who won before; none where the contest does not apply.
-using OthersOf = std::vector<Others> (*)(const Missing&, const Terms&, const Left& refuted);
-
 // A state filters the simulated output, errors of the inputs too, so that its standard error alone is no proof.
-std::vector<Others> all(const Missing& found, const Terms& terms, const Left&) {
+std::vector<Others> all(const Missing& found, const Terms& terms, const Left&, const Gates&) {
   if (found.answer != Answer::inner_state) return {};
-  return {{terms, with({}, terms, [](const ModelTerm&) { return true; })}};
+  return {{terms, with_those({}, terms, [](const ModelTerm&) { return true; })}};
 }
 
-std::vector<Others> states(const Missing& found, const Terms& terms, const Left& refuted) {
+std::vector<Others> states(const Missing& found, const Terms& terms, const Left& refuted, const Gates&) {
   if (found.answer != Answer::inner_state) return {};
-  return {{terms, with(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); })}};
+  return {{terms, with_those(refuted, terms, [](const ModelTerm& term) { return !term.inner_state.empty(); })}};
 }
 
 // A shape has so many numbers that it explains more than the term that acts, noise and outliers among it.
-std::vector<Others> shapes(const Missing& found, const Terms& terms, const Left& refuted) {
+std::vector<Others> shapes(const Missing& found, const Terms& terms, const Left& refuted, const Gates&) {
   if (!has_shapes(found)) return {};
-  return {{terms, with(refuted, terms, [](const ModelTerm& term) { return term.generic; })}};
+  return {{terms, with_those(refuted, terms, [](const ModelTerm& term) { return term.generic; })}};
 }
 
 // A search goes one term after another. Where it took one for another, what it found beside it is wrong too, and no
 // exchange of one term for one leads back.
-std::vector<Others> each_left_out(const Missing& found, const Terms& terms, const Left& refuted) {
+std::vector<Others> each_left_out(const Missing& found, const Terms& terms, const Left& refuted, const Gates&) {
   constexpr std::size_t most = 4;  // more approximate what was not tried
   std::vector<Others> others;
   if (is_certain(found) || found.answer == Answer::inner_state || found.found.size() > most) return others;
@@ -135,84 +114,15 @@ std::vector<Others> each_left_out(const Missing& found, const Terms& terms, cons
   return others;
 }
 
-std::vector<Others> constants(const Missing& found, const Terms& terms, const Left& refuted) {
+std::vector<Others> constants(const Missing& found, const Terms& terms, const Left& refuted, const Gates&) {
   std::set<std::vector<std::string>> places;
   for (const FoundTerm& term : found.found) {
     if (!term.generic && term.constants.size() > 0 && term.inputs.size() == 1) places.insert(term.inputs);
   }
   if (places.empty() || found.answer == Answer::inner_state) return {};
-  return {{terms, with(refuted, terms, [&](const ModelTerm& term) {
+  return {{terms, with_those(refuted, terms, [&](const ModelTerm& term) {
              return places.contains(term.inputs) && !term.constants.empty();
            })}};
-}
-
-Left without(const Left& left, const Left& others) {
-  Left rest;
-  std::ranges::set_difference(left, others, std::inserter(rest, rest.end()));
-  return rest;
-}
-
-// "dx where x > c" is that of "dx".
-bool is_part_of(const ModelTerm& in_regime, const FoundTerm& found) {
-  return in_regime.family == found.family &&
-         in_regime.location.substr(0, in_regime.location.find("where ")) == found.location + " ";
-}
-
-// Terms without constants find the input and the threshold, and those that were found everywhere.
-std::vector<Others> plain_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
-  const Left regimes = terms_of_regimes(terms);
-  // Several terms may imitate one that acts in a part.
-  if (regimes.empty() || !(leaves_something(found) || found.found.size() > 1)) return {};
-  return {{terms, with(without(refuted, regimes), terms, [&](const ModelTerm& term) {
-             return !term.regime.empty() && term.constants.size() > 1 &&
-                    std::ranges::none_of(found.found, [&](const FoundTerm& own) { return is_part_of(term, own); });
-           })}};
-}
-
-// A threshold among those that were tried, and its neighbours, between which it is refined.
-std::vector<double> around(const std::vector<double>& tried, double threshold) {
-  const auto place = std::ranges::lower_bound(tried, threshold);
-  std::vector<double> all;
-  if (place != tried.begin()) all.push_back(*(place - 1));
-  all.push_back(threshold);
-  const auto next = std::ranges::upper_bound(tried, threshold);
-  if (next != tried.end()) all.push_back(*next);
-  return all;
-}
-
-// All terms, beyond the thresholds that were found. A step is an offset in a regime: where it stands for another term
-// its threshold is only near that one's, so others are tried too. A step of another input there may be the same step.
-std::vector<Others> same_regimes(const Missing& found, const Terms& terms, const Left& refuted) {
-  std::map<std::string, std::set<double>> of_regimes;
-  std::map<std::string, std::set<double>> of_steps;
-  for (const FoundTerm& term : found.found) {
-    const double last = term.constants.size() > 0 ? term.constants(term.constants.size() - 1) : 0.0;
-    if (!term.regime.empty()) of_regimes[gate_of(term.location)].insert(last);
-    if (term.family != "step" || !term.regime.empty() || !leaves_something(found)) continue;
-    for (const char* sign : {">", "<="}) of_steps[fmt::format("where {} {} c", term.inputs.front(), sign)].insert(last);
-  }
-  if (of_regimes.empty() && of_steps.empty()) return {};
-  Others others{terms, without(refuted, terms_of_regimes(terms))};
-  for (std::size_t t = 0; t < terms.size(); ++t) {
-    if (terms[t].regime.empty()) continue;
-    std::vector<double>& tried = others.terms[t].constants.back().tried;
-    std::set<double> all;
-    const std::string gate = gate_of(terms[t].location);
-    if (const auto own = of_regimes.find(gate); own != of_regimes.end()) {
-      for (const double threshold : own->second) {
-        for (const double near : around(tried, threshold)) all.insert(near);
-      }
-    } else if (const auto step = of_steps.find(gate); step != of_steps.end() && terms[t].family != "step") {
-      constexpr std::size_t every = 3;  // thresholds are refined
-      for (std::size_t k = 0; k < tried.size(); k += every) all.insert(tried[k]);
-      all.insert(step->second.begin(), step->second.end());
-    } else {
-      others.left_out.insert(t);
-      continue;
-    }
-    tried.assign(all.begin(), all.end());
-  }
-  return {others};
 }
 
 // Terms and the values of their constants were chosen on all rows: a term costs the logarithm of the number of those
@@ -231,10 +141,6 @@ double cost_of_choice(const Missing& answer, const Terms& terms) {
   return cost;
 }
 
-std::vector<Others> same_regimes_again(const Missing& found, const Terms& terms, const Left& refuted) {
-  return leaves_something(found) ? same_regimes(found, terms, refuted) : std::vector<Others>();
-}
-
 struct Contest {
   const char* name;
   OthersOf others;
@@ -247,14 +153,16 @@ bool any_answer(const Missing&) { return true; }
 bool names(const Missing& other) { return !other.found.empty() && is_certain(other); }
 
 // Regimes last, because they are tried where everything else leaves something.
-constexpr std::array<Contest, 8> contests = {{{"no states", states, any_answer},
-                                              {"no terms", all, any_answer},
-                                              {"no shapes", shapes, names},
-                                              {"no such term", each_left_out, names},
-                                              {"no searched constants", constants, any_answer},
-                                              {"regimes", plain_regimes, any_answer},
-                                              {"terms of these regimes", same_regimes, any_answer},
-                                              {"terms of these again", same_regimes_again, any_answer}}};
+constexpr std::array<Contest, 10> contests = {{{"no states", states, any_answer},
+                                               {"no terms", all, any_answer},
+                                               {"no shapes", shapes, names},
+                                               {"no such term", each_left_out, names},
+                                               {"no searched constants", constants, any_answer},
+                                               {"regimes", plain_regimes, any_answer},
+                                               {"terms of these regimes", same_regimes, any_answer},
+                                               {"terms of these again", same_regimes_again, any_answer},
+                                               {"regimes by size", regimes_of_size, any_answer},
+                                               {"simpler in these", simpler_in_these_regimes, any_answer}}};
 
 Missing winner(Missing found, Missing other, const Terms& terms, const CrossValidation& validation) {
   Eigen::VectorXd floors(std::ssize(found.gaps));
@@ -270,26 +178,6 @@ Missing winner(Missing found, Missing other, const Terms& terms, const CrossVali
 }
 
 }  // namespace
-
-std::set<std::size_t> terms_of_regimes(const Terms& terms) {
-  return with({}, terms, [](const ModelTerm& term) { return !term.regime.empty(); });
-}
-
-std::string gate_of(const std::string& location) {
-  const std::size_t place = location.find("where ");
-  return place == std::string::npos ? std::string() : location.substr(place);
-}
-
-bool leaves_something(const Missing& missing) {
-  constexpr double as_noise = 1.2;
-  const auto is_noise = [&](const Gap& gap) {
-    return std::max(gap.after, gap.noise_floor) <= as_noise * gap.known_noise;
-  };
-  if (missing.answer == Answer::inner_state || std::ranges::all_of(missing.gaps, is_noise)) return false;
-  if (missing.time.in_time && missing.time.independent_share < alike_in_neighbours) return true;
-  return missing.answer == Answer::unknown || (missing.answer == Answer::undecided && missing.found.empty()) ||
-         missing.answer == Answer::failed_held_out || !missing.structure.empty();
-}
 
 Missing better_of(Missing found, Missing other, const Advantage& of_other) {
   constexpr double sure = 2.0;  // standard errors
@@ -308,8 +196,9 @@ Missing better_of(Missing found, Missing other, const Advantage& of_other) {
 
 Missing contested(Missing found, const Terms& terms, const Left& refuted, const CrossValidation& validation,
                   const std::function<Missing(const Terms&, const Left&)>& search) {
+  const Gates of_size = terms_of_regimes(terms).empty() ? Gates() : gates_of_size(validation, found);
   for (const Contest& contest : contests) {
-    for (const Others& others : contest.others(found, terms, refuted)) {
+    for (const Others& others : contest.others(found, terms, refuted, of_size)) {
       Missing other = search(others.terms, others.left_out);
       const bool competes = other.answer != Answer::failed_held_out && beyond_constants(other, terms).empty() &&
                             !(has_shapes(other) && !has_shapes(found)) && !has_same_terms(found, other) &&

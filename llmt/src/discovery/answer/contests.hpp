@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "discovery/answer/contests_of_regimes.hpp"
 #include "discovery/answer/one_search.hpp"
 #include "discovery/answer/term_fit.hpp"
 
@@ -24,6 +25,9 @@ class CrossValidation {
 
   /// samples x d: measured minus predicted, times roots of `weights` of rows (n x d, or empty).
   Eigen::MatrixXd errors(const Missing& answer, const Eigen::MatrixXd& weights) const;
+
+  const TermData& data() const { return data_; }
+  const Recording& recording() const { return *recording_; }
 
  private:
   const Simulation* simulation_;
@@ -57,15 +61,12 @@ struct Advantage {
 Advantage advantage(const Eigen::MatrixXd& found, const Eigen::MatrixXd& other, const Eigen::VectorXd& floors,
                     double independent_share);
 
-/// Whether something is left that no term without a regime explains: more than 1.2 times the noise, as far as that is
-/// known, on the rows searched or set aside, and the answer says so, or what is left is alike in neighbouring rows.
-bool leaves_something(const Missing& missing);
-
-/// "where x > c", of the location of a term that acts in a regime; empty: it acts everywhere.
-std::string gate_of(const std::string& location);
-
-/// The indices of terms that act in a regime alone.
-std::set<std::size_t> terms_of_regimes(const std::vector<ModelTerm>& terms);
+/// An effect that acts in a regime alone makes deviations larger there than elsewhere. The two inputs, of those where
+/// that is not chance, beyond whose thresholds the deviations without terms change their size most: n samples, n' and
+/// n'' of them on both sides, have mean squares v, v' and v'' with the largest
+///
+///     n / 2 ln v - n' / 2 ln v' - n'' / 2 ln v''.
+Gates gates_of_size(const CrossValidation& validation, const Missing& found);
 
 /// Of two answers, the one that explains stretches best that no fit has used: by more than two standard errors. Between
 /// them rows cannot tell them apart: the one of fewer numbers has the name, the other is its rival, and it is tentative

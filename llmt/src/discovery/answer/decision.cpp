@@ -246,6 +246,8 @@ bool is_worse(const Missing& missing) {
   return missing.answer == Answer::failed_held_out || left > static_cast<double>(missing.gaps.size());
 }
 
+bool are_terms_held(const Missing& missing) { return !std::ranges::all_of(missing.found, &FoundTerm::confirmed); }
+
 bool may_be_applied(const Missing& missing) {
   constexpr double half = 0.5;
   switch (missing.answer) {

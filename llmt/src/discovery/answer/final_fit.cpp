@@ -252,6 +252,7 @@ void fit_on_all_rows(const Simulation& simulation, const Recording& recording, c
   TermFit fit = fit_terms(model, data, start, placed);
   if (retry_constants(model, data, data, fit)) fit = fit_terms(model, data, fit.parameters, fit.placed);
   const TermFit alone = fit_terms(model, data, start, {});
+  place_thresholds_at_rest(model, measured, rows, missing, static_cast<double>(data.samples.size()), fit);
   set_trial_errors(model, data, fit);
   const bool has_names = missing.answer == Answer::named || missing.answer == Answer::indistinguishable ||
                          missing.answer == Answer::undecided;

@@ -162,7 +162,8 @@ Missing find(const Simulation& simulation, const Recording& as_given, const Meas
   std::vector<Apart> apart = rows_apart(ApartWhen::before_searches, {resting, measured, as_measured});
   smooth.recording = resting.with_zero_bands(bands_of_errors(resting.inputs()));
   const Recording& recording = smooth.recording;
-  SearchedRows rows{.apart = std::vector<bool>(inputs_as_given.rows(), false)};
+  SearchedRows rows{.apart = std::vector<bool>(inputs_as_given.rows(), false),
+                    .bands_of_rest = resting.inputs().zero_bands};
   mark(apart, rows.apart);
   for (const Eigen::Index row : smooth.unknown_sign) rows.apart[row] = true;
   if (recording.is_filtered()) rows.columns = std::make_shared<ColumnCache>(recording);
@@ -294,6 +295,9 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   watched.progress = progress.of_each();
   Missing missing = find_along_rows(simulation, inputs, measured, terms, watched);
   progress.finish();
+  if (!missing.found.empty()) {
+    missing.range_of_terms = range_of_found_terms(simulation, missing, terms, Recording(inputs));
+  }
   return missing;
 }
 

@@ -15,6 +15,7 @@ namespace llmt::discovery {
 /// The rows of a search.
 struct SearchedRows {
   std::vector<bool> apart = {};               ///< not searched, not set aside either
+  Eigen::VectorXd bands_of_rest = {};         ///< p, or empty: rows with an input within its band are apart, at rest
   Eigen::Index fewest_samples = 1000;         ///< that averaging rows in time may leave
   std::shared_ptr<ColumnCache> columns = {};  ///< of filtered rows
 };
@@ -36,6 +37,16 @@ Missing search_once(const Simulation& simulation, const Recording& recording, co
 void fit_on_all_rows(const Simulation& simulation, const Recording& recording, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const SearchedRows& rows, const MissingOptions& options,
                      Missing& missing);
+
+/// Rows at rest are not fitted, because friction may be anything there, and so a threshold within the band of rest of
+/// its input is not determined by those that are. It is placed where the sum over all rows of the band
+///
+///     sum min((measured - predicted)^2 / noise floor^2, 9)
+///
+/// is least, of 41 places, unless what is gained over the place that was fitted, times the share of the rows that are
+/// independent, is less than ln m, the cost of a number. `independent`: m, the number of independent samples.
+void place_thresholds_at_rest(const TermModel& model, const MeasuredOutputs& measured, const SearchedRows& searched,
+                              const Missing& missing, double independent, TermFit& fit);
 
 /// For each term found that is a cause, the other terms of the library that explain as much in its place: beside
 /// everything else that was fitted, they leave squares S' for S with

@@ -198,7 +198,8 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   };
   constexpr std::size_t most_of_regimes = 20;
   constexpr std::size_t most_of_states = 5;
-  for (PlacedTerm& option : of_regimes) option.prior_cost = 0.0;  // the constants are counted among the trials
+  // The constants are counted among the trials.
+  for (PlacedTerm& option : of_regimes) option.prior_cost = model.terms()[option.term].prior_cost;
   add_best(std::move(of_regimes), most_of_regimes, trials_of_regimes);
   add_best(std::move(of_states), most_of_states, trials_of_states);
   return question;

@@ -140,19 +140,25 @@ class Trials {
   }
 };
 
-// Every value of the first constant with every value of the second, or with the one at which that is held.
+// Every value of each constant with every value of the others, or of the last with the one at which that is held.
 std::vector<Eigen::VectorXd> combinations(const std::vector<TermConstant>& constants, std::optional<double> held) {
-  std::vector<Eigen::VectorXd> all;
-  for (const double first : constants.front().tried) {
-    if (constants.size() == 1) all.push_back(Eigen::VectorXd::Constant(1, first));
-    if (constants.size() == 1) continue;
-    for (const double second : held ? std::vector<double>{*held} : constants[1].tried)
-      all.push_back(Eigen::Vector2d(first, second));
+  std::vector<Eigen::VectorXd> all = {Eigen::VectorXd(std::ssize(constants))};
+  for (std::size_t c = 0; c < constants.size(); ++c) {
+    const bool is_held = held && c > 0 && c + 1 == constants.size();
+    const std::vector<double> tried = is_held ? std::vector<double>{*held} : constants[c].tried;
+    std::vector<Eigen::VectorXd> longer;
+    for (const Eigen::VectorXd& values : all) {
+      for (const double value : tried) {
+        longer.push_back(values);
+        longer.back()(static_cast<Eigen::Index>(c)) = value;
+      }
+    }
+    all = std::move(longer);
   }
   return all;
 }
 
-// Halving steps between the neighbours of the values tried; of two constants in turn.
+// Halving steps between the neighbours of the values tried; of several constants in turn.
 Eigen::VectorXd refined(Trials& trials, const std::vector<TermConstant>& constants, Eigen::VectorXd values,
                         double gain) {
   const int sweeps = constants.size() > 1 ? 3 : 1;

@@ -75,10 +75,18 @@ std::vector<double> quantiles(const Inputs& inputs, Eigen::Index column) {
   return tried;
 }
 
+// Of two constants and a threshold each combination is tried, and then refined.
+std::vector<double> every_third(const std::vector<double>& tried) {
+  std::vector<double> some;
+  for (std::size_t k = 0; k < tried.size(); k += 3) some.push_back(tried[k]);
+  return some;
+}
+
 ModelTerm in_regime(const ModelTerm& term, const std::string& gate, Eigen::Index column, std::vector<double> tried,
                     bool above) {
   const char* sign = above ? ">" : "<=";
   const char* symbol = term.constants.empty() ? "c" : "d";
+  const char letter = static_cast<char>('c' + std::ssize(term.constants));  // of the last constant, in code
   ModelTerm own = term;
   own.location += fmt::format("{}where {} {} c", own.location.empty() ? "" : " ", gate, sign);
   own.formula = fmt::format("({}) [{} {} {}]", term.formula, gate, sign, symbol);
@@ -86,8 +94,11 @@ ModelTerm in_regime(const ModelTerm& term, const std::string& gate, Eigen::Index
   auto place = std::ranges::find(own.inputs, gate);
   if (place == own.inputs.end()) place = own.inputs.insert(place, gate);
   const auto number = place - own.inputs.begin() + 1;
-  for (std::string& code : own.code) code = fmt::format("({})*(${} {} ${})", code, number, sign, symbol);
-  for (TermConstant& constant : own.constants) constant.kept = constant.most = 1;
+  for (std::string& code : own.code) code = fmt::format("({})*(${} {} ${})", code, number, sign, letter);
+  for (TermConstant& constant : own.constants) {
+    constant.kept = constant.most = 1;
+    if (own.constants.size() > 1) constant.tried = every_third(constant.tried);
+  }
   own.constants.push_back(
       {.name = term.constants.empty() ? "c" : "threshold", .unit = gate, .tried = std::move(tried), .smooth = false});
   own.columns = [columns = term.columns, column, above](const Rows& rows, const Eigen::VectorXd& constants) {
@@ -108,6 +119,7 @@ ModelTerm in_regime(const ModelTerm& term, const std::string& gate, Eigen::Index
 
 std::vector<ModelTerm> regime_terms(const Inputs& inputs, const std::vector<ModelTerm>& library) {
   constexpr std::size_t fewest = 4;
+  constexpr std::size_t most_constants = 2;
   std::vector<ModelTerm> terms;
   for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
     if (inputs.names[j] == inputs.order) continue;
@@ -116,9 +128,9 @@ std::vector<ModelTerm> regime_terms(const Inputs& inputs, const std::vector<Mode
     for (const ModelTerm& term : library) {
       const bool is_cause = !term.generic && !term.history && term.inner_state.empty() && !term.code.empty();
       const bool is_own = std::ranges::find(term.inputs, inputs.names[j]) != term.inputs.end();
-      // An offset beyond a threshold is the term step, and so is a sign; one constant is that of the term.
+      // An offset beyond a threshold is the term step, and so is a sign.
       if (!is_cause || term.family == "offset" || (is_own && term.family == "sign") ||
-          term.constants.size() > (is_own ? 0 : 1))
+          term.constants.size() > (is_own ? 0 : most_constants))
         continue;
       for (const bool above : {true, false}) terms.push_back(in_regime(term, inputs.names[j], j, tried, above));
     }

@@ -158,13 +158,49 @@ std::string TermModel::label(const PlacedTerm& placed) const {
   return text;
 }
 
-Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& missing,
-                                 const std::vector<ModelTerm>& terms, const Recording& elsewhere) {
-  const bool has_bands = elsewhere.inputs().zero_bands.size() > 0;
-  const Recording recording = has_bands ? elsewhere : elsewhere.with_zero_bands(missing.zero_bands);
+namespace {
+
+TermModel model_of_found(const Simulation& simulation, const Missing& missing, const std::vector<ModelTerm>& terms,
+                         const Recording& recording) {
   std::vector<std::string> outputs;
   for (const Gap& gap : missing.gaps) outputs.push_back(gap.output);
-  return TermModel(simulation, recording, outputs, terms).predict(values_of(missing.parameters), placed_terms(missing));
+  return {simulation, recording, std::move(outputs), terms};
+}
+
+Recording with_bands_of(const Missing& missing, const Recording& recording) {
+  const bool has_bands = recording.inputs().zero_bands.size() > 0;
+  return has_bands ? recording : recording.with_zero_bands(missing.zero_bands);
+}
+
+}  // namespace
+
+Eigen::MatrixXd range_of_found_terms(const Simulation& simulation, const Missing& missing,
+                                     const std::vector<ModelTerm>& terms, const Recording& as_given) {
+  const Recording recording = with_bands_of(missing, as_given);
+  const TermModel model = model_of_found(simulation, missing, terms, recording);
+  const Eigen::VectorXd values = values_of(missing.parameters);
+  const Eigen::MatrixXd added = model.predict(values, placed_terms(missing)) - model.simulated(values);
+  std::vector<Eigen::Index> rows = missing.searched;
+  rows.insert(rows.end(), missing.held_out.begin(), missing.held_out.end());
+  Eigen::MatrixXd range(added.cols(), 2);
+  range << added(rows, Eigen::all).colwise().minCoeff().transpose(),
+      added(rows, Eigen::all).colwise().maxCoeff().transpose();
+  return range;
+}
+
+Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& missing,
+                                 const std::vector<ModelTerm>& terms, const Recording& elsewhere) {
+  const Recording recording = with_bands_of(missing, elsewhere);
+  const TermModel model = model_of_found(simulation, missing, terms, recording);
+  const Eigen::VectorXd values = values_of(missing.parameters);
+  Eigen::MatrixXd predicted = model.predict(values, placed_terms(missing));
+  if (missing.range_of_terms.size() == 0 || !are_terms_held(missing)) return predicted;
+  const Eigen::MatrixXd& base = model.simulated(values);
+  for (Eigen::Index o = 0; o < predicted.cols(); ++o) {
+    const auto added = (predicted.col(o) - base.col(o)).array();
+    predicted.col(o) = base.col(o).array() + added.max(missing.range_of_terms(o, 0)).min(missing.range_of_terms(o, 1));
+  }
+  return predicted;
 }
 
 Eigen::VectorXd values_of(const std::vector<Parameter>& parameters) {

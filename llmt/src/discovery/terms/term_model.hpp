@@ -125,6 +125,10 @@ class TermModel {
   Eigen::MatrixXd evaluate(const Eigen::VectorXd& values) const;
 };
 
+/// Missing::range_of_terms at the rows that were searched and those set aside.
+Eigen::MatrixXd range_of_found_terms(const Simulation& simulation, const Missing& missing,
+                                     const std::vector<ModelTerm>& terms, const Recording& as_given);
+
 /// What corrected() of llmt/discovery/simulation.hpp returns.
 Eigen::MatrixXd with_found_terms(const Simulation& simulation, const Missing& missing,
                                  const std::vector<ModelTerm>& terms, const Recording& elsewhere);

@@ -35,10 +35,11 @@ void remember_errors(CalibrationRecord& record, const Eigen::VectorXd& left_out_
 
 struct ReportOptions {
   CalibrationOptions calibration = {};
-  bool correct = false;  ///< grow a residual correction and judge it
-  /// Of the correction. Its leaves are crisp; folds and threads are those below, intervals are not made.
+  bool correct = false;  ///< learn a residual correction and judge it
+  /// Of a tree of the correction. Its leaves are crisp; folds and threads are those below, intervals are not made.
   FitOptions correction = {};
-  int folds = 5;  ///< 0: no held-out figures
+  bool boost = false;  ///< the correction is a sum of trees, with the seed below and no other options
+  int folds = 5;       ///< 0: no held-out figures
   FoldKind kind = FoldKind::random;
   int correction_folds = 5;  ///< for the correction's leaf count, within every fold; 0: as grown
   std::uint64_t seed = 1;
@@ -57,10 +58,10 @@ struct Stage {
 };
 
 struct CalibrationReport {
-  Calibration calibration;              ///< from all poses
-  std::optional<FitResult> correction;  ///< grown on all poses, whether it is kept or not
-  Stage nominal;                        ///< base and tool registered, everything else as given
-  Stage geometric;                      ///< calibrated
+  Calibration calibration;               ///< from all poses
+  std::optional<Correction> correction;  ///< learnt on all poses, whether it is kept or not
+  Stage nominal;                         ///< base and tool registered, everything else as given
+  Stage geometric;                       ///< calibrated
   std::optional<Stage> corrected;
   /// The correction lowers the held-out mean error by more than two standard errors of the gain; without folds it is
   /// kept without being judged.

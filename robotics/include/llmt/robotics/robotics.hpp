@@ -16,6 +16,7 @@
 #include "llmt/robotics/chain.hpp"
 #include "llmt/robotics/compensation.hpp"
 #include "llmt/robotics/correction.hpp"
+#include "llmt/robotics/correction_model.hpp"
 #include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/discovery/discovery_options.hpp"
 #include "llmt/robotics/discovery/discovery_result.hpp"
