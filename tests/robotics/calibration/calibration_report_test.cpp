@@ -224,7 +224,7 @@ TEST(Correction, MustBeAModelOfTheRobotsJoints) {
 // Errors of five joints that add up.
 TEST(Correction, ASumExplainsOnPosesLeftOutMoreThanATree) {
   const Robot truth = perturbed(mdh_like(), 0.5, 0.05, 1);
-  Measurements seen = measure(truth, random_poses(truth.chain, 300, 2), 0.02, 3);
+  Measurements seen = measure(truth, random_poses(truth.chain, 400, 2), 0.02, 3);
   for (Eigen::Index i = 0; i < seen.poses.count(); ++i) {
     const auto q = [&](Eigen::Index joint) { return seen.poses.joints(i, joint); };
     for (Eigen::Index joint = 0; joint < 5; ++joint) seen.positions_mm(i, 2) += 0.5 * std::sin(4.0 * q(joint));
