@@ -119,8 +119,9 @@ void add_calibrate(CLI::App& app) {
   add_urdf_links(*command, arguments->links);
   add_input_file(*command, "data", task.data_file, "Measurements (CSV with units in the column names)")->required();
   command->add_flag("--correct", options.correct, "Learn the residual as a function of the joint values");
-  command->add_flag("--boost", options.boost, "Learn it with a sum of many small trees, more accurate, in place of one")
-      ->needs("--correct");
+  CLI::Option* const boost = command->add_flag(
+      "--boost", options.boost, "Learn it with a sum of many small trees, more accurate, in place of one");
+  boost->needs("--correct");
   add_folds(*command, options.folds, "Folds of the held-out figures, 0: none");
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows: for paths and grids");
   add_input_file(*command, "--test", task.test_file, "Further measurements that take no part, judged at the end");
@@ -138,10 +139,12 @@ void add_calibrate(CLI::App& app) {
             "Known beforehand to within a standard deviation, mm or deg: joint2.a=0.1");
   add_count(*command, "--max-leaves", options.correction.max_leaves, Eigen::Index{0},
             "Most leaves of a tree of the correction, 0: no limit")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes(boost);
   add_count(*command, "--min-leaf", options.correction.min_leaf_samples, Eigen::Index{0},
             "Fewest poses in a leaf, 0: twice the coefficients of a leaf")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes(boost);
   command
       ->add_option("--accept-suspicion", task.accept_suspicion,
                    "Take the files as they stand although they look like this mistake, by the name that was printed")

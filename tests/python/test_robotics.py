@@ -249,6 +249,12 @@ def test_a_correction_goes_with_its_robot(arm, measured, tmp_path, boost):
         robotics.robot((tmp_path / "cal.yaml").read_text())
 
 
+@pytest.mark.parametrize("options", [{}, {"correct": True, "max_leaves": 4}, {"correct": True, "min_leaf": 9}])
+def test_boost_is_of_a_correction_and_takes_no_size_of_a_tree(arm, measured, options):
+    with pytest.raises(ValueError, match="boost"):
+        robotics.calibrate(arm, measured, folds=0, boost=True, **options)
+
+
 def test_urdf_gets_the_identified_origins(measured, tmp_path):
     calibrated = robotics.calibrate(SAMPLES / "arm.urdf", measured, folds=0).robot
     calibrated.save(tmp_path / "arm.urdf")

@@ -186,6 +186,8 @@ def calibrate(
         raise ValueError("new_session is about test, which is not given")
     if boost and not correct:
         raise ValueError("boost is about correct, which is not asked for")
+    if boost and (max_leaves or min_leaf):
+        raise ValueError("max_leaves and min_leaf are of one tree, and boost asks for a sum of them")
     arguments = dict(locals())
     arm = _robot_of(robot)
     given = _checked(source_of(measured, "measured"), columns, arm)
