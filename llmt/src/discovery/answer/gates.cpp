@@ -1,6 +1,7 @@
 // Where deviations change their size.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -19,7 +20,7 @@ struct GateAt {
 // The place of an input beyond which squares have another mean: least negative logarithm of the likelihood of two
 // normal distributions.
 GateAt best_gate(const Eigen::VectorXd& x, const Eigen::VectorXd& squares) {
-  constexpr Eigen::Index fewest_share = 20;  // of the samples one in so many is on each side
+  constexpr Eigen::Index fewest_share = 20;  // at least a twentieth of the samples is on each side
   const Eigen::Index n = x.size();
   std::vector<Eigen::Index> order(n);
   std::iota(order.begin(), order.end(), Eigen::Index{0});

@@ -8,7 +8,7 @@
 namespace llmt::discovery {
 namespace {
 
-// Friction at rest may be anything: a row counts by at most the square of so many noise floors.
+// In noise floors. Friction at rest may be anything, so no row counts by more than the square of this.
 constexpr double far_off_at_rest = 3.0;
 
 class RowsAtRest {
