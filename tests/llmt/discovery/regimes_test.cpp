@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "discovery/answer/contests.hpp"
+#include "discovery/answer/contests_of_regimes.hpp"
 #include "discovery/answer/question.hpp"
 #include "discovery/answer/term_fit.hpp"
 #include "discovery/recording/row_split.hpp"
@@ -100,94 +101,42 @@ TEST(Regimes, AWaveIsFoundWhereDeviationsAreLarge) {
   EXPECT_NEAR(found.constants(1), threshold, 0.03);
 }
 
-// A law whose other part is within its error is not that law.
-TEST(Regimes, ALawIsNotNamedWhereASimplerOneExplainsAsMuch) {
-  const Missing missing = missing_from([](double, double speed) { return speed > 0.0 ? 0.3 : -0.3; });
-  ASSERT_EQ(missing.found.size(), 1U);
-  EXPECT_EQ(missing.found[0].family, "sign");
-  EXPECT_EQ(missing.found[0].location, "v where h > c");
-  EXPECT_NEAR(missing.found[0].coefficients(0), 0.3, 0.005);
-}
-
-// Which of the laws that are the same function there acts, no row can tell.
-TEST(Regimes, LawsBeyondOneThresholdAreRivals) {
-  const Missing missing = missing_from([](double, double speed) { return std::asinh(speed / 2.0); });
-  ASSERT_EQ(missing.found.size(), 1U);
-  const FoundTerm& found = missing.found[0];
-  const std::string law = "asinh v where h > c";
-  const bool is_named = found.family + " " + found.location == law;
-  EXPECT_TRUE(is_named || std::ranges::find(found.rivals, law, &RivalTerms::what) != found.rivals.end());
-  EXPECT_NEAR(found.constants(found.constants.size() - 1), threshold, 0.03);
-}
-
-// The samples between a threshold and its true place are far off, and were taken for outliers.
-TEST(Regimes, AThresholdIsPlacedOnAllSamples) {
-  constexpr Eigen::Index n = 200;
-  Inputs inputs{{"x"}, Eigen::VectorXd::LinSpaced(n, 0.0, 1.0)};
-  inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, 1.0);
-  const Eigen::MatrixXd y = (inputs.values.array() > 0.61).cast<double>();
-  const std::vector<ModelTerm> terms = standard_terms(inputs);
-  const Simulation simulation = tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"});
-  const Recording recording(inputs);
-  const TermModel model(simulation, recording, {"y"}, terms);
-  const RowSplit split = split_of_all(recording, {.apart = {}, .fewest_samples = n}, {});
-  ASSERT_EQ(split.searched.size(), n);
-  const TermData data{.samples = split.searched,
-                      .measured = means(y, split.searched),
-                      .sigma = Eigen::VectorXd::Ones(1),
-                      .stretches = split.stretches};
-  std::vector<std::size_t> between;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (inputs.values(i) > 0.5 && inputs.values(i) <= 0.61) between.push_back(static_cast<std::size_t>(i));
-  }
-  TermFit fit;
-  fit.parameters = values_of(simulation.parameters);
-  fit.placed.push_back(
-      {.term = static_cast<std::size_t>(std::ranges::find(terms, "step", &ModelTerm::family) - terms.begin()),
-       .output = 0,
-       .constants = Eigen::VectorXd::Constant(1, 0.5),
-       .coefficients = Eigen::VectorXd::Ones(1)});
-  const TermData kept = without_samples(data, between);
-  TermFit without = fit;
-  retry_constants(model, kept, kept, without);
-  EXPECT_GT(std::abs(without.placed[0].constants(0) - 0.61), 0.005);
-  EXPECT_TRUE(retry_constants(model, kept, data, fit));
-  EXPECT_NEAR(fit.placed[0].constants(0), 0.61, 0.005);
-}
-
-// A threshold beside a constant that stays.
-TEST(Regimes, AThresholdBesideAConstantIsPlacedAgain) {
-  constexpr Eigen::Index n = 200;
-  Inputs inputs{{"x", "v"}, Eigen::MatrixXd(n, 2)};
-  inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, 1.0);
-  Eigen::MatrixXd y(n, 1);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const double t = inputs.instants(i);
-    inputs.values.row(i) << t, std::sin(50.0 * t);
-    y(i, 0) = t > 0.61 ? std::tanh(inputs.values(i, 1) / 0.3) : 0.0;
-  }
-  std::vector<ModelTerm> terms = standard_terms(inputs);
-  for (ModelTerm& term : regime_terms(inputs, terms)) terms.push_back(std::move(term));
-  const auto is_wanted = [](const ModelTerm& term) {
-    return term.family == "tanh" && term.location == "v where x > c";
+// Without the law, then without any that has a constant of its own there; the threshold stays.
+TEST(Regimes, ALawIsHeldAgainstSimplerOnesAtItsThreshold) {
+  Inputs inputs{{"h", "v"}, Eigen::MatrixXd(100, 2)};
+  inputs.values.col(0) = Eigen::VectorXd::LinSpaced(100, 0.0, 1.0);
+  inputs.values.col(1) = (7.0 * inputs.values.col(0).array()).sin();
+  const std::vector<ModelTerm> terms = regime_terms(inputs, standard_terms(inputs));
+  const auto place = [&](const std::string& family, const std::string& location) {
+    return static_cast<std::size_t>(
+        std::ranges::find_if(
+            terms, [&](const ModelTerm& term) { return term.family == family && term.location == location; }) -
+        terms.begin());
   };
-  const Simulation simulation = tabulated(Eigen::MatrixXd::Zero(n, 1), {"y"});
-  const Recording recording(inputs);
-  const TermModel model(simulation, recording, {"y"}, terms);
-  const RowSplit split = split_of_all(recording, {.apart = {}, .fewest_samples = n}, {});
-  const TermData data{.samples = split.searched,
-                      .measured = means(y, split.searched),
-                      .sigma = Eigen::VectorXd::Ones(1),
-                      .stretches = split.stretches};
-  TermFit fit;
-  fit.parameters = values_of(simulation.parameters);
-  fit.placed.push_back({.term = static_cast<std::size_t>(std::ranges::find_if(terms, is_wanted) - terms.begin()),
-                        .output = 0,
-                        .constants = Eigen::Vector2d(0.3, 0.5),
-                        .coefficients = Eigen::VectorXd::Ones(1)});
-  EXPECT_TRUE(retry_constants(model, data, data, fit));
-  EXPECT_NEAR(fit.placed[0].constants(0), 0.3, 0.03);
-  EXPECT_NEAR(fit.placed[0].constants(1), 0.61, 0.01);
+  const std::string here = "v where h > c";
+  Missing found;
+  found.found.resize(1);
+  found.found[0].term = place("coulomb_stribeck", here);
+  found.found[0].family = "coulomb_stribeck";
+  found.found[0].location = here;
+  found.found[0].regime = "h";
+  found.found[0].inputs = terms.at(found.found[0].term).inputs;
+  found.found[0].constants = Eigen::Vector2d(0.1, 0.5);
+  const std::vector<Others> others = simpler_in_these_regimes(found, terms, {}, {});
+  ASSERT_EQ(others.size(), 2U);
+  const auto is_tried = [&](std::size_t search, const std::string& family, const std::string& location) {
+    return !others[search].left_out.contains(place(family, location));
+  };
+  EXPECT_FALSE(is_tried(0, "coulomb_stribeck", here));
+  EXPECT_TRUE(is_tried(0, "stribeck", here));
+  EXPECT_FALSE(is_tried(1, "stribeck", here));
+  for (const std::size_t search : {0U, 1U}) {
+    EXPECT_TRUE(is_tried(search, "sign", here));
+    EXPECT_FALSE(is_tried(search, "sign", "v where h <= c"));
+    EXPECT_LE(others[search].terms[place("sign", here)].constants.back().tried.size(), 3U);
+  }
+  found.found[0].constants = Eigen::VectorXd::Constant(1, 0.5);  // none of its own
+  EXPECT_TRUE(simpler_in_these_regimes(found, terms, {}, {}).empty());
 }
 
 // The gates of deviations that are normal, of the standard deviation 1 where h > 0.4321, and of `elsewhere`.
